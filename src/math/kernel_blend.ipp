@@ -20,18 +20,48 @@ struct Poses {
   Vec t;
 };
 
-// Number `i` of each of the four edges.
-template <Edge Blend::*kEdge>
-inline V4 lanes(const Blend* const* four, int i) {
-  return V4{(four[0]->*kEdge).pose[i], (four[1]->*kEdge).pose[i], (four[2]->*kEdge).pose[i],
-            (four[3]->*kEdge).pose[i]};
+inline void transpose(V4* rows) {
+  const V4 a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6);
+  const V4 b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7);
+  const V4 c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6);
+  const V4 d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
-template <Edge Blend::*kEdge>
-inline Poses poses(const Blend* const* four) {
-  return {{lanes<kEdge>(four, 0), lanes<kEdge>(four, 1), lanes<kEdge>(four, 2)},
-          lanes<kEdge>(four, 3),
-          {lanes<kEdge>(four, 4), lanes<kEdge>(four, 5), lanes<kEdge>(four, 6)}};
+
+using Unaligned = double __attribute__((vector_size(32), aligned(8)));
+
+// The numbers from `first` on of each of four arrays: lanes[k] has number first + k of each.
+inline void load_lanes(const double* const* four, int first, V4* lanes) {
+  for (int i = 0; i < 4; ++i) lanes[i] = *reinterpret_cast<const Unaligned*>(four[i] + first);
+  transpose(lanes);
 }
+// The opposite, into those that are not null.
+inline void store_lanes(const V4* lanes, double* const* four, int first) {
+  V4 rows[4] = {lanes[0], lanes[1], lanes[2], lanes[3]};
+  transpose(rows);
+  for (int i = 0; i < 4; ++i) {
+    if (four[i] != nullptr) *reinterpret_cast<Unaligned*>(four[i] + first) = rows[i];
+  }
+}
+
+inline Poses load_poses(const double* const* four) {
+  V4 q[4];
+  V4 rest[4];
+  load_lanes(four, 0, q);
+  load_lanes(four, 3, rest);
+  return {{q[0], q[1], q[2]}, q[3], {rest[1], rest[2], rest[3]}};
+}
+inline void store_poses(const Poses& X, double* const* four) {
+  const V4 lanes[7] = {X.u.x, X.u.y, X.u.z, X.w, X.t.x, X.t.y, X.t.z};
+  store_lanes(lanes, four, 0);
+  store_lanes(lanes + 3, four, 3);
+}
+
+// Where the groups of four numbers of a covariance begin; the last two overlap.
+constexpr int kGroups[6] = {0, 4, 8, 12, 16, 17};
 
 inline Vec rotate(Vec u, V4 w, Vec a) {
   const Vec once = cross(u, a);
@@ -176,14 +206,10 @@ struct Mats {
   }
 };
 
-inline V4 covariance_lanes(const Blend* const* four, int i) {
-  return V4{four[0]->X0.upper[i], four[1]->X0.upper[i], four[2]->X0.upper[i], four[3]->X0.upper[i]};
-}
-
 // The covariances Σ + s (1-s)/4 ad(ξ) Σ ad(ξ)ᵀ. With ad(ξ) Σ = [L, K; *, H], the blocks of the
 // product are L Θᵀ + K [ρ]×ᵀ, K Θᵀ and H Θᵀ.
-inline void bulged(const Blend* const* four, const Ways& xi, V4 s, V4* upper) {
-  for (int i = 0; i < 21; ++i) upper[i] = covariance_lanes(four, i);
+inline void bulged(const double* const* four, const Ways& xi, V4 s, V4* upper) {
+  for (const int first : kGroups) load_lanes(four, first, upper + first);
   const V4* u = upper;
   const Mats P{{{u[0], u[1], u[2]}, {u[1], u[6], u[7]}, {u[2], u[7], u[11]}}};
   const Mats C{{{u[3], u[8], u[12]}, {u[4], u[9], u[13]}, {u[5], u[10], u[14]}}};
@@ -226,38 +252,45 @@ inline void blend_covariance(const Way& way, const Blend& one) {
   store_upper(sum, one.X + 7);
 }
 
-// Of the edges that are near; `some` are those of the four that are different.
-inline void blend_covariances(const Blend* const* four, std::size_t some, const Poses& X0,
-                              const Between& b, V4 s) {
+// Of the edges that are near.
+inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, const Between& b,
+                              V4 s) {
   // Up to here, what bulged() leaves out is below 1e-8.
   constexpr double kQuarticEnds = 1e-3;
-  enum { kStays, kBulges, kBlends } how[4];
   const V4 distance2 = dot(b.way, b.way);
-  bool all_stay = true;
+  double* bulging[4] = {};
+  bool blending[4] = {};
   bool bulges = false;
-  for (std::size_t i = 0; i < some; ++i) {
-    const Blend& one = *four[i];
+  bool blends = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Blend& one = some[i];
+    one.edge->upper = one.X0.upper;
+    if (!one.near) continue;
     const bool same = same_covariance(one);
-    how[i] = !one.near || (same && stays(one.X0.upper, b.angle2[i], distance2[i])) ? kStays
-             : same && b.angle2[i] < kQuarticEnds                                  ? kBulges
-                                                                                   : kBlends;
-    all_stay = all_stay && how[i] == kStays;
-    bulges = bulges || how[i] == kBulges;
-    one.edge->upper = how[i] == kStays ? one.X0.upper : one.X + 7;
-  }
-  if (all_stay) return;
-  const Ways xi = ways(X0, b);
-  V4 upper[21];
-  if (bulges) bulged(four, xi, s, upper);
-  for (std::size_t i = 0; i < some; ++i) {
-    if (how[i] == kBulges) {
-      for (int k = 0; k < 21; ++k) four[i]->X[7 + k] = upper[k][i];
-    } else if (how[i] == kBlends) {
-      blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
-                        {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
-                        xi.angle2[i]},
-                       *four[i]);
+    if (same && stays(one.X0.upper, b.angle2[i], distance2[i])) continue;
+    one.edge->upper = one.X + 7;
+    if (same && b.angle2[i] < kQuarticEnds) {
+      bulging[i] = one.X + 7;
+      bulges = true;
+    } else {
+      blends = blending[i] = true;
     }
+  }
+  if (!bulges && !blends) return;
+  const Ways xi = ways(X0, b);
+  if (bulges) {
+    const double* upper0[4];
+    for (std::size_t i = 0; i < 4; ++i) upper0[i] = some[i < count ? i : 0].X0.upper;
+    V4 upper[21];
+    bulged(upper0, xi, s, upper);
+    for (const int first : kGroups) store_lanes(upper + first, bulging, first);
+  }
+  for (std::size_t i = 0; blends && i < count; ++i) {
+    if (!blending[i]) continue;
+    blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
+                      {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
+                      xi.angle2[i]},
+                     some[i]);
   }
 }
 
@@ -266,27 +299,27 @@ inline void blend_all(Blend* all, std::size_t count) {
   for (std::size_t from = 0; from < count; from += 4) {
     const std::size_t here = count - from < 4 ? count - from : 4;
     Blend* some = all + from;
-    const Blend* four[4];
-    for (std::size_t i = 0; i < 4; ++i) four[i] = some + (i < here ? i : 0);
-    const Poses X0 = poses<&Blend::X0>(four);
-    const Poses X1 = poses<&Blend::X1>(four);
+    const double* pose0[4];
+    const double* pose1[4];
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Blend& one = some[i < here ? i : 0];
+      pose0[i] = one.X0.pose;
+      pose1[i] = one.X1.pose;
+    }
+    const auto part = [&](std::size_t i) { return some[i < here ? i : 0].s; };
+    const V4 s{part(0), part(1), part(2), part(3)};
+    const Poses X0 = load_poses(pose0);
+    const Poses X1 = load_poses(pose1);
     const Between b = between(X0, X1);
-    const V4 s{four[0]->s, four[1]->s, four[2]->s, four[3]->s};
-    const Poses X = go(X0, X1, b, s);
+    double* out[4] = {};
     for (std::size_t i = 0; i < here; ++i) {
       some[i].near = b.sine2[i] < kSmallSine2;
       if (!some[i].near) continue;
-      double* out = some[i].X;
-      out[0] = X.u.x[i];
-      out[1] = X.u.y[i];
-      out[2] = X.u.z[i];
-      out[3] = X.w[i];
-      out[4] = X.t.x[i];
-      out[5] = X.t.y[i];
-      out[6] = X.t.z[i];
-      some[i].edge->pose = out;
+      out[i] = some[i].X;
+      some[i].edge->pose = some[i].X;
     }
-    if constexpr (kWithCovariance) blend_covariances(four, here, X0, b, s);
+    store_poses(go(X0, X1, b, s), out);
+    if constexpr (kWithCovariance) blend_covariances(some, here, X0, b, s);
   }
 }
 

@@ -85,9 +85,9 @@ inline Moment operator*(const Form& D, const Moment& J) {
           D.M * J.theta_rho, D.M * J.theta_theta};
 }
 
-// E[(a × u) (b × v)ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M: the tensor
-// cross product of both matrices, whose columns are N_k × M_l - N_l × M_k. Without the last turn of
-// the lanes.
+// E[(a × u) (b × v)ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M: the
+// tensor cross product of both matrices, whose columns are N_k × M_l - N_l × M_k. Without the last
+// turn of the lanes.
 inline Mat half_crossed(const Mat& N, const Mat& M) {
   Mat product;
   for (int q = 0; q < 3; ++q) {
@@ -103,9 +103,9 @@ inline Mat turned(const Mat& a) {
   return {{turn_lanes(a.column[0]), turn_lanes(a.column[1]), turn_lanes(a.column[2])}};
 }
 
-// E[[a, u] [b, v]ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M, since [a, u]
-// = (θa × ρu + ρa × θu, θa × θu). All pairs used here have a symmetric one, whose lower left block is
-// left out.
+// E[[a, u] [b, v]ᵀ] for (a, b) independent of (u, v), with E[a bᵀ] = N and E[u vᵀ] = M, since
+// [a, u] = (θa × ρu + ρa × θu, θa × θu). It is symmetric for all pairs used here; its lower left
+// block is left out.
 inline Moment bracket_moment(const Moment& N, const Moment& M) {
   return {
       turned(half_crossed(N.theta_theta, M.rho_rho) + half_crossed(N.theta_rho, M.rho_theta) +

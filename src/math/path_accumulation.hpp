@@ -91,9 +91,9 @@ template <class Value>
   return X_AB;
 }
 
-/// As above with the full error description. To second order, only the common errors of an edge and
-/// its part of unknown correlation are transported edge by edge; to fourth order, the errors of each
-/// edge are composed with those of the climb, which is ten times slower.
+/// As above with the full error description. To second order, only the common errors of an edge
+/// and its part of unknown correlation are transported edge by edge; to fourth order, the errors of
+/// each edge are composed with those of the climb, which is ten times slower.
 template <>
 class PathAccumulation<Belief> {
  public:
