@@ -110,10 +110,12 @@ def measure(bin_dir, daemons, clients, questions):
     common = ["--domain", domain, "--profile", processes.PROFILE]
     with tempfile.TemporaryDirectory() as folder, lease:
         program = [bin_dir / "bare_participant", domain, processes.PROFILE]
-        bare = [[*program, "server"]] + [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
+        bare = [[*program, "server", "asked"]]
+        bare += [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
         with running(bare) as started:
             control = cost_of(started)
-            control["new_participant_ms"] = milliseconds([*program, "asker"], questions, control["packets_s"])
+            control["new_participant_ms"] = milliseconds([*program, "asker", "asked"], questions,
+                                                         control["packets_s"])
         files = scaling.configurations(pathlib.Path(folder), daemons, daemons)
         ours = [[bin_dir / "tfduded", "--no-state", "--config", file, *common] for file in files]
         with running(ours) as owners:

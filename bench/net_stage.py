@@ -25,6 +25,7 @@ EXAMPLES = processes.ROOT / "examples" / "thesis"
 ALL_CPUS = ",".join(map(str, sorted(os.sched_getaffinity(0))))
 
 MEETING_S = 1.0  # time for many daemons to discover each other [s]
+LEFT_S = 0.05  # time for the others to handle that a participant has left [s]
 
 
 def patient_profile(work: pathlib.Path, profile: pathlib.Path) -> pathlib.Path:
@@ -64,7 +65,7 @@ class Stage:
         with open(self.work / "servers.log", "ab") as log, contextlib.ExitStack() as started:
             running = []
             for command in commands:
-                server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, bufsize=0)
+                server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, bufsize=0)
                 running.append(server)
                 started.callback(processes.end, server)
             # Sends the signal to all, before waiting for the first.
@@ -161,7 +162,8 @@ def floor(stage: Stage, quick: bool) -> Iterator[dict]:
     calls, repetitions = (1000, 5) if quick else (20000, 5)
     config = merged(stage.work, [EXAMPLES / "robot.yaml", EXAMPLES / "arms.yaml"])
     for placement, cpu in (("one_core", "0"), ("two_cores", "1")):
-        floor_echo = stage.command(cpu, "floor_echo", ["--domain", floor_domain, "--profile", stage.profile])
+        floor_echo = stage.command(cpu, "floor_echo", ["--domain", floor_domain, "--profile", stage.profile,
+                                                     "--partition", ""])
         with stage.servers([stage.daemon(cpu, central_domain, config), floor_echo]) as (_, echo):
             yield from stage.measured(
                 stage.command("0", "floor_bench",
@@ -204,13 +206,16 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
     with their presence alone (idle_cpu), so that row measures the machine."""
     central_domain = stage.domain("central")
     decentral_domain = stage.domain("decentral")
+    floor_domain = stage.domain("floor")
     repetitions = 5
-    for count in (2, 8, 16) if quick else (2, 4, 8, 16, 32):
+    for count in (2, 4, 8, 16) if quick else (1, 2, 4, 8, 16, 32):
         configs = [chain_config(stage.work, f"p{k}", 2 * k, 2) for k in range(count)]
         central = chain_config(stage.work, "central", 0, 2 * count)
         daemons = [stage.daemon(ALL_CPUS, decentral_domain, config) for config in configs]
         daemons.append(stage.daemon("1", central_domain, central))
-        echoes = [stage.command(ALL_CPUS, "floor_echo", [])] * count
+        echoes = [stage.command(ALL_CPUS, "floor_echo",
+                                ["--domain", floor_domain, "--profile", stage.profile, "--partition", k])
+                  for k in range(count)]
         with stage.servers(daemons + echoes) as servers:
             time.sleep(MEETING_S)
             yield idle_cpu(f"scale/partitions/{count}/idle_cpu", servers[:count],
@@ -220,7 +225,7 @@ def scale_partitions(stage: Stage, quick: bool) -> Iterator[dict]:
                 stage.command("0", "scale_bench",
                               ["--mode", "partitions", "--partitions", count,
                                "--central", central_domain, "--domain", decentral_domain,
-                               "--udp-ports", ports,
+                               "--floor", floor_domain, "--udp-ports", ports,
                                "--profile", stage.profile,
                                "--calls", (800 if quick else 8000) // count,
                                "--repetitions", repetitions]),
@@ -254,6 +259,31 @@ def scale_frames(stage: Stage, quick: bool) -> Iterator[dict]:
             60 if quick else 200)
 
 
+def first_answer(stage: Stage, quick: bool) -> Iterator[dict]:
+    """The whole run of a command that looks up a path over two daemons, and that of a bare client that asks two bare
+    servers with the same readers and writers; in turn."""
+    runs = 15 if quick else 100
+    domain, bare_domain = stage.domain("decentral"), stage.domain("floor")
+    bare = [bare_domain, stage.profile]
+    daemons = [stage.daemon(ALL_CPUS, domain, chain_config(stage.work, f"p{k}", 2 * k, 2)) for k in range(2)]
+    servers = [stage.command(ALL_CPUS, "bare_participant", [*bare, "server", k]) for k in range(2)]
+    commands = {
+        "ours": stage.command(ALL_CPUS, "tfdude", ["--domain", domain, "--profile", stage.profile,
+                                                   "lookup", "chain_0", "chain_3"]),
+        "dds": stage.command(ALL_CPUS, "bare_participant", [*bare, "asker", 0, 1])}
+    with stage.servers(daemons + servers):
+        time.sleep(MEETING_S)
+        times = {who: [] for who in commands}
+        for _ in range(runs):
+            for who, command in commands.items():
+                begin = time.monotonic()
+                subprocess.run(command, stdout=subprocess.DEVNULL, check=True, timeout=processes.PATIENCE_S)
+                times[who].append((time.monotonic() - begin) * 1000)
+                time.sleep(LEFT_S)
+    for who, values in times.items():
+        yield figures.summary(f"first_answer/{who}", "ms", values)
+
+
 PARTS = {
     "thesis": thesis,
     "floor": floor,
@@ -261,6 +291,7 @@ PARTS = {
     "scale_partitions": scale_partitions,
     "scale_clients": scale_clients,
     "scale_frames": scale_frames,
+    "first_answer": first_answer,
 }
 
 

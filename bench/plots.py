@@ -234,7 +234,7 @@ def draw_contention(figures):
 SCALES = (
     ("partitions", "partitions on the path", "lookup [µs]", microseconds, (
         ("decentralized", "decentralized"), ("centralized", "centralized"),
-        ("udp_floor", "bare UDP"))),
+        ("dds_floor", "bare DDS"), ("udp_floor", "bare UDP"))),
     ("clients", "clients at once", "lookup [µs]", microseconds, (("latency", "latency"),)),
     ("clients", "clients at once", "calls a second, of all", as_measured, (("rate", "rate"),)),
     ("frames", "frames", "call [µs]", microseconds, (("lookup", "lookup"), ("update", "update"))),

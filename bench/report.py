@@ -62,6 +62,10 @@ FLOOR = """\
 Round trips in microseconds, median / p99, compared with a bare Fast DDS ping-pong and with bare UDP,
 both with the same payload.
 """
+FIRST_ANSWER = """\
+Whole runs of a process, from its start until it has ended: a lookup over two daemons, and a bare
+Fast DDS client with the same readers, writers and QoS that asks two servers once each.
+"""
 CORE = """\
 Nanoseconds. Our values include a covariance unless the row says "pose only"; tf2 has none.
 """
@@ -270,6 +274,14 @@ def floor_section(figures, drawn, home):
     return [FLOOR, table(head, rows), picture(drawn, "floor", home)]
 
 
+def first_answer_section(figures, _drawn, _home):
+    """One-shot commands beside a bare client."""
+    rows = [(name, *(value(figures, f"first_answer/{who}", which, as_measured)
+                     for which in ("median", "p90", "max")))
+            for who, name in (("ours", "`tfdude lookup` [ms]"), ("dds", "bare DDS [ms]"))]
+    return [FIRST_ANSWER, table(("process", "median", "p90", "max"), rows)]
+
+
 def stream_section(figures, _drawn, _home):
     """One publisher, one owner."""
     rows = []
@@ -338,7 +350,7 @@ def pushed_section(figures, _drawn, _home):
     rows = [(name, *(value(figures, key, which) for which in ("median", "p90", "p99")),
              number(ratio(figures, ours, key)), number(ratio(figures, ours, key, "p99")))
             for name, key in (("ours", ours), ("bare DDS, waiting thread", "pushed/latency/dds"),
-                              ("bare DDS, listener", "pushed/latency/dds_listener"))]
+                              ("bare DDS by a woken thread", "pushed/latency/dds_woken"))]
     head = ("latency", "median", "p90", "p99", "ours / this, median", "ours / this, p99")
     latest = value(figures, "pushed/latest", convert=nanoseconds)
     cases = sorted({tuple(map(int, key.split("/")[3:])) for key in figures
@@ -433,6 +445,7 @@ SECTIONS = (
     ("The thesis's cases over a narrow link", ("narrow/",), narrow_section),
     ("On the wire: the thesis's table 5.1", ("wire/",), wire_section),
     ("The floor", ("floor/",), floor_section),
+    ("The first answer", ("first_answer/",), first_answer_section),
     ("Streamed updates", ("stream/",), stream_section),
     ("Pushed paths", ("pushed/",), pushed_section),
     ("Own frames, beside tf2", ("core/",), core_section),

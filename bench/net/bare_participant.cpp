@@ -2,21 +2,21 @@
 // its own: what idling costs without tf-dude, and how long one question takes.
 //
 //   bare_participant DOMAIN PROFILE owner|client    ends with the end of its standard input
-//   bare_participant DOMAIN PROFILE server          an owner that answers
-//   bare_participant DOMAIN PROFILE asker           asks the server once, and leaves
+//   bare_participant DOMAIN PROFILE server NAME     an owner that answers in this DDS partition
+//   bare_participant DOMAIN PROFILE asker NAME...   asks each of these servers once, and leaves
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -26,15 +26,15 @@ namespace {
 
 constexpr int kLongLease = 30;  // [s], as that of our participants
 
-constexpr const char* kServer = "server";  // the DDS partition of its requests
 constexpr std::chrono::seconds kPatience{20};
 constexpr std::chrono::milliseconds kRepeatEvery{2};
 
 class Bare {
  public:
-  Bare(std::uint32_t domain, const std::string& profile, const std::string& role)
+  Bare(std::uint32_t domain, const std::string& profile, const std::string& role,
+       const std::vector<std::string>& servers)
       : profiles_(*Profiles::load(profile)) {
-    const bool owner = role == "owner" || role == kServer;
+    const bool owner = role == "owner" || role == "server";
     auto qos = profiles_.participant();
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {kLongLease, 0};
     DiscoveryGate discovery_gate(gate_, std::make_shared<LifeSigns>());
@@ -44,39 +44,46 @@ class Bare {
     discovery_gate.open();
     read<wire::Presence, PresenceType>(kPresenceTopic, "presence_reader");
     read<wire::Reply, ReplyType>(kReplyTopic, "call_reader", "",
-                                 [this](const wire::Reply&) { answered_ = true; });
+                                 [this](const edds::SampleInfo& info) { answered(info); });
     // As a command that asks for its frames: it has no reader of pages.
     if (role == "asker") {
-      request_ = write<RequestType>(kRequestTopic, "call_writer", kServer);
-      write<RequestType>(kChangeTopic, "call_writer", kServer);
+      for (const std::string& server : servers) {
+        requests_.push_back(write<RequestType>(kRequestTopic, "call_writer", server));
+        write<RequestType>(kChangeTopic, "call_writer", server);
+      }
       return;
     }
     read<wire::Page, PageType>(kDirectoryTopic, "directory_reader");
     if (!owner) return;
-    if (role == kServer) reply_ = write<ReplyType>(kReplyTopic, "call_writer");
-    read<wire::Request, RequestType>(kRequestTopic, "call_reader", role,
-                                     [this](const wire::Request&) { answer(); });
-    read<wire::Request, RequestType>(kChangeTopic, "call_reader", role);
+    if (role == "server") reply_ = write<ReplyType>(kReplyTopic, "call_writer");
+    const std::string own = servers.empty() ? role : servers.front();
+    read<wire::Request, RequestType>(kRequestTopic, "call_reader", own,
+                                     [this](const edds::SampleInfo&) { answer(); });
+    read<wire::Request, RequestType>(kChangeTopic, "call_reader", own);
     read<wire::Update, UpdateType>(kUpdateTopic, "update_reader");
     read<wire::Joints, JointsType>(kJointTopic, "update_reader");
     write<PresenceType>(kPresenceTopic, "presence_writer");
     write<PageType>(kDirectoryTopic, "directory_writer");
   }
 
-  /// Asks until the answer is there. @return whether it came
+  /// Asks all servers until they have answered. @return whether they have
   [[nodiscard]] bool ask() {
     const auto deadline = Deadline::clock::now() + kPatience;
-    if (!request_->wait_until_matched(deadline)) return false;
+    for (Writer* request : requests_) {
+      if (!request->wait_until_matched(deadline)) return false;
+    }
     wire::Request request;
     request.body().probe(0);
-    while (!answered_ && Deadline::clock::now() < deadline) {
-      request_->write(&request);
-      const auto next = Deadline::clock::now() + kRepeatEvery;
-      while (!answered_ && Deadline::clock::now() < next) {
-        std::this_thread::sleep_for(std::chrono::microseconds(100));
-      }
+    Lock lock(mutex_);
+    const auto all = [this]()
+                         TFDUDE_REQUIRES(mutex_) { return answered_.size() >= requests_.size(); };
+    while (!all() && Deadline::clock::now() < deadline) {
+      lock.unlock();
+      for (Writer* writer : requests_) writer->write(&request);
+      lock.lock();
+      arrived_.wait_until(lock, Deadline::clock::now() + kRepeatEvery, all);
     }
-    return answered_;
+    return all();
   }
 
   void leave() {
@@ -88,6 +95,14 @@ class Bare {
   }
 
  private:
+  void answered(const edds::SampleInfo& info) {
+    {
+      const Lock lock(mutex_);
+      answered_.insert(writer_of(info));
+    }
+    arrived_.notify_one();
+  }
+
   void answer() {
     if (reply_ == nullptr) return;
     wire::Reply reply;
@@ -107,11 +122,11 @@ class Bare {
   template <class Sample, class Type>
   void read(
       const char* name, const char* profile, const std::string& partition = "",
-      std::function<void(const Sample&)> on_sample = [](const Sample&) {}) {
+      std::function<void(const edds::SampleInfo&)> on_sample = [](const edds::SampleInfo&) {}) {
     readers_.push_back(std::make_shared<Reader<Sample>>(
         context(), topic<Type>(name), partition, profile,
         typename Reader<Sample>::Calls{
-            [on_sample](const Sample& sample, const edds::SampleInfo&) { on_sample(sample); },
+            [on_sample](const Sample&, const edds::SampleInfo& info) { on_sample(info); },
             nullptr}));
   }
   template <class Type>
@@ -129,18 +144,21 @@ class Bare {
   edds::DomainParticipant* participant_ = nullptr;
   std::vector<std::shared_ptr<void>> readers_;
   std::vector<std::unique_ptr<Writer>> writers_;
-  Writer* request_ = nullptr;
+  std::vector<Writer*> requests_;
   Writer* reply_ = nullptr;
-  std::atomic<bool> answered_{false};
+  Mutex mutex_;
+  Condition arrived_;
+  std::set<ertps::GUID_t> answered_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace
 }  // namespace tfdude::fastdds
 
 int main(int argc, char** argv) {
-  if (argc != 4) return 2;
+  if (argc < 4) return 2;
   const std::string role = argv[3];
-  tfdude::fastdds::Bare bare(static_cast<std::uint32_t>(std::stoul(argv[1])), argv[2], role);
+  tfdude::fastdds::Bare bare(static_cast<std::uint32_t>(std::stoul(argv[1])), argv[2], role,
+                             {argv + 4, argv + argc});
   if (role == "asker") {
     const bool answered = bare.ask();
     bare.leave();

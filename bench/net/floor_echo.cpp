@@ -1,11 +1,12 @@
-// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and, if a domain
-// is given, over Fast DDS. Prints "ready udp_port=PORT" and answers until it is stopped.
+// The other end of floor_bench and of scale_bench's fan-out: bare echoes over UDP and Fast DDS.
+// Prints "ready udp_port=PORT" and answers until it is stopped.
 //
-//   floor_echo --domain DOMAIN --profile FILE
-//   floor_echo
+//   floor_echo --domain DOMAIN --profile FILE --partition NAME
+//
+// It is asked in this DDS partition (empty: the default one), and answers in the default one.
 
 #include <cstdio>
-#include <optional>
+#include <string>
 
 #include "net/floor_dds.hpp"
 #include "net/harness.hpp"
@@ -18,8 +19,9 @@ namespace edds = tfdude::fastdds::edds;
 /// Answers in the callback, with a writer that already exists.
 class DdsEcho final : public edds::DataReaderListener {
  public:
-  DdsEcho(std::uint32_t domain, const std::string& profile)
-      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "call") {}
+  explicit DdsEcho(const bench::Arguments& arguments)
+      : endpoints_(static_cast<std::uint32_t>(arguments.number("domain")),
+                   arguments.text("profile"), ends(arguments.text("partition")), *this) {}
 
   void on_data_available(edds::DataReader* reader) override {
     if (!tfdude::fastdds::ok(reader->take_next_sample(&sample_, &info_)) || !info_.valid_data)
@@ -29,6 +31,12 @@ class DdsEcho final : public edds::DataReaderListener {
   }
 
  private:
+  static bench::FloorEnds ends(const std::string& partition) {
+    auto ends = bench::answering_end();
+    ends.read = partition;
+    return ends;
+  }
+
   bench::wire::Ping sample_;
   edds::SampleInfo info_;
   bench::FloorEndpoints endpoints_;
@@ -37,11 +45,7 @@ class DdsEcho final : public edds::DataReaderListener {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::optional<DdsEcho> dds;
-  if (argc > 1) {
-    const bench::Arguments arguments(argc, argv);
-    dds.emplace(static_cast<std::uint32_t>(arguments.number("domain")), arguments.text("profile"));
-  }
+  const DdsEcho dds(bench::Arguments(argc, argv));
   bench::UdpSocket udp;
   std::printf("ready udp_port=%d\n", udp.port());
   std::fflush(stdout);

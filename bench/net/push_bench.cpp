@@ -6,12 +6,11 @@
 //
 // The owner prints "ready". Then it updates all edges 1,000 times a second, or sends bare samples,
 // in turns by the clock that both processes share. The watcher measures:
-//   pushed/latency/ours           from before update() until a waiting thread has read the new
-// value
+//   pushed/latency/ours           from before update() until a waiting thread has read the value
 //   pushed/latency/dds            from before write() until a thread that waits for the listener
-// has
-//                                 the sample
-//   pushed/latency/dds_listener   the same until the listener has it
+//                                 has the sample
+//   pushed/latency/dds_woken      the same if another thread is woken to write the sample, as the
+//                                 owner of a pushed path does
 //   pushed/latest                 reading the path's newest value with covariance, while it is
 //                                 pushed
 
@@ -19,7 +18,10 @@
 #include <cstdio>
 #include <cstring>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "net/pushed_robot.hpp"
 #include "transport/fastdds/codec.hpp"
@@ -37,8 +39,12 @@ constexpr int kJoints = 10;
 constexpr double kPeriod = 1e-3;
 constexpr double kTurn = 0.25;  // duration of a turn [s]
 
-/// The number of the turn: tf-dude has the even ones.
+enum class Who { kOurs, kDds, kDdsWoken };
+
 std::int64_t turn_at(double moment) { return static_cast<std::int64_t>(moment / kTurn); }
+
+/// Whose turn it is.
+Who whose(std::int64_t turn) { return static_cast<Who>(turn % 3); }
 
 /// CDR bytes of the message that is pushed with each update.
 std::uint32_t pushed_bytes() {
@@ -54,18 +60,55 @@ std::uint32_t domain_of(const bench::Arguments& arguments) {
   return static_cast<std::uint32_t>(arguments.number("domain"));
 }
 
+/// A thread that is woken for each sample, and sends it.
+class WokenSender {
+ public:
+  explicit WokenSender(bench::BareSender& bare) : bare_(bare) {}
+
+  void wake() {
+    {
+      const std::lock_guard lock(mutex_);
+      called_ = Clock::now();
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  [[noreturn]] void run() {
+    while (true) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return called_.has_value(); });
+      const auto called = *std::exchange(called_, std::nullopt);
+      lock.unlock();
+      bare_.send(called);
+    }
+  }
+
+  bench::BareSender& bare_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<Clock::time_point> called_;
+  std::thread thread_{[this] { run(); }};  // last: it uses the other members
+};
+
 [[noreturn]] void own(const bench::Arguments& arguments) {
   bench::PushedRobot robot(kJoints, arguments.options("domain"));
   bench::BareSender bare(domain_of(arguments), arguments.text("profile"), pushed_bytes());
+  WokenSender woken(bare);
   std::fprintf(stderr, "pushed: %u bytes\n", pushed_bytes());
   std::puts("ready");
   std::fflush(stdout);
   for (double moment = bench::shared_clock();; moment += kPeriod) {
     bench::sleep_until(moment);
-    if (turn_at(moment) % 2 == 0) {
-      robot.move();
-    } else {
-      bare.send();
+    switch (whose(turn_at(moment))) {
+      case Who::kOurs:
+        robot.move();
+        break;
+      case Who::kDds:
+        bare.send();
+        break;
+      case Who::kDdsWoken:
+        woken.wake();
     }
   }
 }
@@ -75,44 +118,37 @@ std::uint32_t domain_of(const bench::Arguments& arguments) {
 /// Waits for bare samples.
 class BareReceiver final : public edds::DataReaderListener {
  public:
-  struct Arrival {
-    std::int64_t sent = 0;    // [ns]
-    Clock::time_point heard;  // by the listener
-  };
-
   BareReceiver(std::uint32_t domain, const std::string& profile)
-      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
+      : endpoints_(domain, profile, bench::listening_end(), *this) {}
 
   void on_data_available(edds::DataReader* reader) override {
     // There is more than one sample if this thread was late; then the newest counts.
     while (tfdude::fastdds::ok(reader->take_next_sample(&ping_, &info_))) {
       if (!info_.valid_data) continue;
       const std::lock_guard lock(mutex_);
-      std::memcpy(&last_.sent, ping_.filler().data(), sizeof last_.sent);
-      last_.heard = Clock::now();
+      std::memcpy(&last_, ping_.filler().data(), sizeof last_);
     }
     arrived_.notify_one();
   }
 
-  [[nodiscard]] Arrival last() {
+  /// When the last sample was sent [ns].
+  [[nodiscard]] std::int64_t last() {
     const std::lock_guard lock(mutex_);
     return last_;
   }
 
-  /// Waits for a sample that was sent after the given one, and replaces it; false at the deadline.
-  bool wait_for_more(Clock::time_point deadline, Arrival& arrival) {
+  /// Waits for a sample that was sent later, and replaces the moment; false at the deadline.
+  bool wait_for_more(Clock::time_point deadline, std::int64_t& sent) {
     std::unique_lock lock(mutex_);
-    if (!arrived_.wait_until(lock, deadline, [&] { return last_.sent > arrival.sent; })) {
-      return false;
-    }
-    arrival = last_;
+    if (!arrived_.wait_until(lock, deadline, [&] { return last_ > sent; })) return false;
+    sent = last_;
     return true;
   }
 
  private:
   std::mutex mutex_;
   std::condition_variable arrived_;
-  Arrival last_;
+  std::int64_t last_ = 0;
   bench::wire::Ping ping_;
   edds::SampleInfo info_;
   bench::FloorEndpoints endpoints_;
@@ -146,7 +182,7 @@ class Watcher {
   Watcher(PathWatch& path, BareReceiver& bare) : path_(path), bare_(bare) {}
 
   void run(double seconds, int repetitions) {
-    const auto all = {&ours_.series(), &dds_.series(), &dds_listener_.series()};
+    const auto all = {&ours_.series(), &dds_.series(), &dds_woken_.series()};
     for (int i = 0; i < repetitions; ++i) {
       const double end = bench::shared_clock() + seconds;
       for (double now = 0; (now = bench::shared_clock()) < end;) {
@@ -154,10 +190,11 @@ class Watcher {
         const auto rest =
             std::chrono::duration<double>(static_cast<double>(turn + 1) * kTurn - now);
         const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(rest);
-        if (turn % 2 == 0) {
+        const Who who = whose(turn);
+        if (who == Who::kOurs) {
           see_ours(until);
         } else {
-          see_bare(until);
+          see_bare(until, who == Who::kDds ? dds_ : dds_woken_);
         }
       }
       for (Series* series : all) series->end_repetition();
@@ -180,12 +217,9 @@ class Watcher {
     }
   }
 
-  void see_bare(Clock::time_point until) {
-    BareReceiver::Arrival arrival = bare_.last();
-    while (bare_.wait_for_more(until, arrival)) {
-      dds_.add(arrival.sent, Clock::now());
-      dds_listener_.add(arrival.sent, arrival.heard);
-    }
+  void see_bare(Clock::time_point until, Latencies& latencies) {
+    std::int64_t sent = bare_.last();
+    while (bare_.wait_for_more(until, sent)) latencies.add(sent, Clock::now());
   }
 
   [[nodiscard]] std::int64_t newest() const {
@@ -197,7 +231,7 @@ class Watcher {
   BareReceiver& bare_;
   Latencies ours_{"ours"};
   Latencies dds_{"dds"};
-  Latencies dds_listener_{"dds_listener"};
+  Latencies dds_woken_{"dds_woken"};
 };
 
 void watch(const bench::Arguments& arguments) {

@@ -83,7 +83,7 @@ std::uint32_t domain_of(const Arguments& arguments) {
 class Listener final : public tfdude::fastdds::edds::DataReaderListener {
  public:
   Listener(std::uint32_t domain, const std::string& profile)
-      : endpoints_(domain, profile, bench::kPongTopic, bench::kPingTopic, *this, "update") {}
+      : endpoints_(domain, profile, bench::listening_end(), *this) {}
 
   void on_data_available(tfdude::fastdds::edds::DataReader* reader) override {
     while (tfdude::fastdds::ok(reader->take_next_sample(&ping_, &info_))) continue;

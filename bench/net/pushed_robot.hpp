@@ -57,14 +57,14 @@ class NoListener final : public fastdds::edds::DataReaderListener {};
 class BareSender {
  public:
   BareSender(std::uint32_t domain, const std::string& profile, std::uint32_t bytes)
-      : endpoints_(domain, profile, kPingTopic, kPongTopic, listener_, "update") {
+      : endpoints_(domain, profile, sending_end(), listener_) {
     ping_.filler().resize(bytes - kPingOverhead);
   }
 
-  /// The sample begins with the moment of sending, as PushedRobot's stamps.
-  void send() {
-    const std::int64_t now = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
-    std::memcpy(ping_.filler().data(), &now, sizeof now);
+  /// The sample begins with the moment of the call, as PushedRobot's stamps.
+  void send(Clock::time_point called = Clock::now()) {
+    const std::int64_t stamp = std::chrono::nanoseconds(called.time_since_epoch()).count();
+    std::memcpy(ping_.filler().data(), &stamp, sizeof stamp);
     endpoints_.write(ping_);
   }
 

@@ -2,11 +2,11 @@
 // daemons and echoes.
 //
 //   scale_bench --mode partitions --partitions N --central DOMAIN --domain DOMAIN
-//               --udp-ports P,P,...
+//               --floor DOMAIN --udp-ports P,P,...
 //     One lookup along a chain across N partitions, compared with the same lookup of one daemon
-//     that owns all frames, and with a bare UDP datagram to each of N processes and back, which is
-//     the lower bound of asking N processes.
-//     scale/partitions/N/decentralized, /centralized, /udp_floor
+//     that owns all frames, and with the lower bounds of asking N processes at once: as many bytes
+//     to each of N processes and back, over bare Fast DDS with the same QoS, and over bare UDP.
+//     scale/partitions/N/decentralized, /centralized, /dds_floor, /udp_floor
 //   scale_bench --mode clients --domain DOMAIN
 //     1 to 16 concurrent clients, each with its own thread, that ask one owner.
 //     scale/clients/N/latency, /rate
@@ -25,6 +25,7 @@
 #include <thread>
 #include <vector>
 
+#include "net/floor_dds.hpp"
 #include "net/harness.hpp"
 #include "net/udp.hpp"
 
@@ -34,11 +35,6 @@ using bench::Arguments;
 using bench::must;
 using bench::Series;
 using tfdude::Client;
-
-// CDR payloads of a lookup of one segment between two of these frames, and of its reply, as
-// idl/tfdude.idl lays them out; floor_bench computes such sizes.
-constexpr std::size_t kRequestBytes = 56;
-constexpr std::size_t kReplyBytes = 252;
 
 std::vector<int> numbers(const std::string& list) {
   std::vector<int> all;
@@ -60,23 +56,31 @@ auto lookup(Client& client, const std::string& a, const std::string& b) {
 
 // --- partitions ---
 
-class FanOut {
+class UdpFanOut {
  public:
-  explicit FanOut(std::vector<int> ports) : ports_(std::move(ports)) {}
+  UdpFanOut(std::vector<int> ports, const bench::Sizes& sizes)
+      : ports_(std::move(ports)), sizes_(sizes) {}
 
   void call() {
     ++number_;
     for (const int port : ports_) {
-      socket_.ask(static_cast<std::uint16_t>(port), number_, kRequestBytes, kReplyBytes);
+      socket_.ask(static_cast<std::uint16_t>(port), number_, sizes_.request, sizes_.reply);
     }
     for (std::size_t missing = ports_.size(); missing > 0; --missing) socket_.await_reply();
   }
 
  private:
   std::vector<int> ports_;
+  const bench::Sizes sizes_;
   std::uint32_t number_ = 0;
   bench::UdpSocket socket_;
 };
+
+/// Those of a lookup of the part of the path that one owner has.
+bench::Sizes sizes_of_segment() {
+  return bench::sizes_of({1, chain(1), tfdude::LookupRequest{{{chain(1), chain(3)}}}}, "p1",
+                         {1, 0, tfdude::SegmentValues{{tfdude::Transform()}, {}, {}, {}}});
+}
 
 void compare_partitions(const Arguments& arguments) {
   const int partitions = arguments.number("partitions");
@@ -85,14 +89,22 @@ void compare_partitions(const Arguments& arguments) {
   };
   auto central = must(Client::open(arguments.options("central")), "the centralized deployment");
   auto decentral = must(Client::open(arguments.options("domain")), "the decentralized deployment");
-  FanOut fan_out(numbers(arguments.text("udp-ports")));
+  const bench::Sizes sizes = sizes_of_segment();
+  UdpFanOut udp(numbers(arguments.text("udp-ports")), sizes);
+  bench::FloorEnds ends = bench::asking_end();
+  ends.written.clear();
+  for (int i = 0; i < partitions; ++i) ends.written.push_back(std::to_string(i));
+  bench::DdsPing dds(static_cast<std::uint32_t>(arguments.number("floor")),
+                     arguments.text("profile"), ends);
+  dds.prepare(sizes);
   // Each partition owns two frames; the first frame of the first partition is the root.
   const std::string last = chain(2 * partitions - 1);
   (void)bench::await_lookup(central, chain(0), last);
   (void)bench::await_lookup(decentral, chain(0), last);
   bench::measure({bench::turn(key("decentralized"), lookup(decentral, chain(0), last)),
                   bench::turn(key("centralized"), lookup(central, chain(0), last)),
-                  bench::turn(key("udp_floor"), [&] { fan_out.call(); })},
+                  bench::turn(key("dds_floor"), [&] { dds.call(); }),
+                  bench::turn(key("udp_floor"), [&] { udp.call(); })},
                  extent_of(arguments));
 }
 
