@@ -203,13 +203,17 @@ std::vector<Owner> Directory::joint_owners(const std::string& name) const {
   return owners;
 }
 
-// A page that was replaced before its delivery arrives after those that were published later.
+// A page that was replaced before its delivery arrives after those that were published later. Of
+// pages with one epoch, one lists all that have to be there.
 void Directory::note_epoch(Known& partition, const Page& page) {
-  if (page.epoch >= partition.awaited_epoch) {
+  const bool lists_all =
+      page.epoch == partition.awaited_epoch && page.others.size() >= partition.awaited.size();
+  if (page.epoch > partition.awaited_epoch || lists_all) {
     partition.awaited_epoch = page.epoch;
     partition.awaited = page.others;
   }
   const bool all_there =
+      partition.pages.size() >= partition.page_count &&
       std::all_of(partition.awaited.begin(), partition.awaited.end(), [&](const PageEpoch& one) {
         const auto there = partition.pages.find(one.number);
         return there != partition.pages.end() && there->second.epoch >= one.epoch;

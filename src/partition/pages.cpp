@@ -4,7 +4,11 @@
 
 namespace tfdude {
 
+// Rather a page that is published anyway.
 std::uint32_t Pages::page_with_room() {
+  if (changed_.count(changed_latest_) != 0 && with_room_.count(changed_latest_) != 0) {
+    return changed_latest_;
+  }
   if (with_room_.empty()) {
     with_room_.insert(count());
     pages_.emplace_back();
@@ -13,12 +17,13 @@ std::uint32_t Pages::page_with_room() {
 }
 
 void Pages::changed(std::uint32_t number, const std::string& id) {
-  if (pages_[number].size() >= kPageSize) {
+  if (pages_[number].size() >= room_of(number)) {
     with_room_.erase(number);
   } else {
     with_room_.insert(number);
   }
   changed_.insert(number);
+  changed_latest_ = number;
   if (watching_) touched_.insert(id);
 }
 
@@ -96,6 +101,7 @@ void Pages::overtake(std::uint64_t incarnation) {
   resume(incarnation);
   for (std::uint32_t number = 0; number < count(); ++number) changed_.insert(number);
   changed_last_.clear();
+  published_ = false;
   close_epoch();
 }
 
@@ -108,6 +114,18 @@ void Pages::note_epochs() {
     changed_last_.push_front({number, epoch_});
     // One more than a page lists, as it need not list itself.
     if (changed_last_.size() > kOthers + 1) changed_last_.pop_back();
+  }
+}
+
+// Of pages that are published together, the last one lists the others; those before list only it.
+void Pages::list_others(Page& page) const {
+  const std::uint32_t last = *changed_.rbegin();
+  if (page.number != last) {
+    page.others.push_back({last, epoch_});
+    return;
+  }
+  for (const PageEpoch& one : changed_last_) {
+    if (one.number != last && page.others.size() < kOthers) page.others.push_back(one);
   }
 }
 
@@ -126,11 +144,11 @@ std::vector<Page> Pages::take_changed() {
       }
     }
     for (const auto& [id, tombstone] : sheet.tombstones) page.tombstones.push_back(tombstone);
-    for (const PageEpoch& one : changed_last_) {
-      if (one.number != number && page.others.size() < kOthers) page.others.push_back(one);
-    }
+    list_others(page);
     changed.push_back(std::move(page));
   }
+  if (!published_) changed_last_.clear();
+  published_ = published_ || !changed.empty();
   changed_.clear();
   return changed;
 }

@@ -18,16 +18,23 @@ namespace tfdude {
 /// An owner's structure, split into the pages that it publishes. Not thread-safe.
 class Pages {
  public:
-  /// Frames and tombstones per page: a page of long ids stays below 64 KiB, one of usual ids has
-  /// about 2 KiB.
+  /// The most frames and tombstones on a page: one of long ids stays below 64 KiB, one of usual ids
+  /// has about 2 KiB.
   static constexpr std::size_t kPageSize = 60;
+
+  /// The frames and tombstones that a page has room for. The first pages have little room, since
+  /// each change sends a whole page; later ones have more, since whoever joins reads all pages.
+  [[nodiscard]] static constexpr std::size_t room_of(std::uint32_t number) {
+    return number < 8 * (kPageSize - 8) ? 8 + number / 8 : kPageSize;
+  }
 
   /// Tombstones kept; the oldest are dropped first.
   static constexpr std::size_t kMaxTombstones = 1024;
 
   /// How many previously changed pages a page lists. A page that was replaced by a later version
   /// before its delivery arrives late. If more pages than these changed meanwhile, this is not
-  /// noticed.
+  /// noticed. Pages that did not change since the first publication are not listed; a presence has
+  /// their number.
   static constexpr std::size_t kOthers = 16;
 
   struct Place {
@@ -94,6 +101,7 @@ class Pages {
   std::uint32_t page_with_room();
   void changed(std::uint32_t number, const std::string& id);
   void note_epochs();
+  void list_others(Page& page) const;
   void forget_tombstone(const std::string& id);
 
   std::string partition_;
@@ -107,6 +115,8 @@ class Pages {
   std::deque<std::pair<std::string, std::uint64_t>> oldest_tombstones_;
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;
+  std::uint32_t changed_latest_ = 0;
+  bool published_ = false;              // as this incarnation
   std::deque<PageEpoch> changed_last_;  // the latest first
   bool watching_ = false;
   std::set<std::string> touched_;

@@ -120,6 +120,28 @@ TEST_CASE("an epoch is known when all pages that changed for it have arrived") {
   CHECK(replica.directory.epoch(arms) == 4);
 }
 
+TEST_CASE("an epoch is known only with all pages that the partition has announced") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 2), kNow);
+  replica.directory.apply(Page{"arms", 0, 1, 3, {}});
+  const Owner arms = *replica.directory.owner("arms");
+  CHECK(replica.directory.epoch(arms) == 0);
+  replica.directory.apply(Page{"arms", 1, 1, 2, {}});
+  CHECK(replica.directory.epoch(arms) == 3);
+}
+
+TEST_CASE("of pages with one epoch, the one that lists the others counts") {
+  Replica replica;
+  const Page lists_all{"arms", 2, 1, 2, {}, {}, {{0, 2}, {1, 2}, {3, 1}}};
+  replica.apply({Page{"arms", 0, 1, 2, {}, {}, {{2, 2}}}, Page{"arms", 1, 1, 2, {}, {}, {{2, 2}}}});
+  const Owner arms = *replica.directory.owner("arms");
+  CHECK(replica.directory.epoch(arms) == 0);
+  replica.apply({lists_all, Page{"arms", 1, 1, 2, {}, {}, {{2, 2}}}});
+  CHECK(replica.directory.epoch(arms) == 0);
+  replica.directory.apply(Page{"arms", 3, 1, 1, {}});
+  CHECK(replica.directory.epoch(arms) == 2);
+}
+
 TEST_CASE("an epoch never goes back") {
   Replica replica;
   replica.directory.apply(Page{"arms", 0, 1, 4, {}});

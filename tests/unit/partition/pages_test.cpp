@@ -70,63 +70,92 @@ TEST_CASE("a page has its partition and incarnation and entries") {
   CHECK(structure_of(changed) == Structure{{"base", "world"}, {"world", ""}});
 }
 
-TEST_CASE("a page is full at 60 frames, and the next frame opens another") {
+// So many frames fill the first pages.
+constexpr std::size_t kFirst = Pages::room_of(0);
+
+TEST_CASE("a full page is followed by another, and later pages have more room") {
   Pages pages("robot", kLife);
-  put_numbered(pages, 0, Pages::kPageSize);
+  put_numbered(pages, 0, kFirst);
   CHECK(pages.count() == 1);
-  put_numbered(pages, Pages::kPageSize, 1);
+  put_numbered(pages, kFirst, 1);
   CHECK(pages.count() == 2);
+  put_numbered(pages, kFirst + 1, 20'000);
   const auto changed = pages.take_changed();
-  REQUIRE(changed.size() == 2);
-  CHECK(changed[0].entries.size() == 60);
-  CHECK(changed[1].entries.size() == 1);
+  REQUIRE(changed.size() > 450);
+  CHECK(changed.size() < 600);
+  CHECK(changed[0].entries.size() == 8);
+  CHECK(changed[8].entries.size() == 9);
+  CHECK(changed[415].entries.size() == 59);
+  CHECK(changed[416].entries.size() == Pages::kPageSize);
+  CHECK(changed[changed.size() - 2].entries.size() == Pages::kPageSize);
 }
 
 TEST_CASE("only pages that changed since the last time are published") {
   Pages pages("robot", kLife);
-  put_numbered(pages, 0, 3 * Pages::kPageSize);
+  put_numbered(pages, 0, 3 * kFirst);
   CHECK(numbers_of(pages.take_changed()) == Numbers{0, 1, 2});
   CHECK(pages.take_changed().empty());
-  pages.put("f70", "f0", 0);
+  pages.put("f" + std::to_string(kFirst), "f0", 0);
   CHECK(numbers_of(pages.take_changed()) == Numbers{1});
   pages.erase("f0");
-  pages.erase("f179");
+  pages.erase("f" + std::to_string(3 * kFirst - 1));
   CHECK(numbers_of(pages.take_changed()) == Numbers{0, 2});
   pages.erase("nobody");
   CHECK(pages.take_changed().empty());
 }
 
+TEST_CASE("what comes instead of something else is on its page") {
+  Pages pages("robot", kLife);
+  put_numbered(pages, 0, 3 * kFirst);
+  pages.erase("f0");
+  CHECK(numbers_of(pages.take_changed()).size() == 3);
+  // Page 0 has room, but page 2 is published in any case.
+  const std::string last = "f" + std::to_string(3 * kFirst - 1);
+  pages.erase(last);
+  pages.leave({last, 1, Tombstone::Kind::kRemoved, {}});
+  CHECK(numbers_of(pages.take_changed()) == Numbers{2});
+  pages.put(last, "", 2);
+  CHECK(numbers_of(pages.take_changed()) == Numbers{2});
+  put_numbered(pages, 1000, 1);
+  CHECK(numbers_of(pages.take_changed()) == Numbers{0});
+}
+
 TEST_CASE("room on a page is reused even after the page was empty") {
   Pages pages("robot", kLife);
-  put_numbered(pages, 0, 2 * Pages::kPageSize);
-  for (std::size_t i = 0; i < Pages::kPageSize; ++i) pages.erase("f" + std::to_string(i));
-  CHECK(pages.frame_count() == Pages::kPageSize);
+  put_numbered(pages, 0, 2 * kFirst);
+  (void)pages.take_changed();
+  for (std::size_t i = 0; i < kFirst; ++i) pages.erase("f" + std::to_string(i));
+  CHECK(pages.frame_count() == kFirst);
   const auto emptied = pages.take_changed();
-  CHECK(numbers_of(emptied) == Numbers{0, 1});
+  CHECK(numbers_of(emptied) == Numbers{0});
   CHECK(emptied[0].entries.empty());
-  put_numbered(pages, 1000, Pages::kPageSize);
+  put_numbered(pages, 1000, kFirst);
   CHECK(pages.count() == 2);
   CHECK(numbers_of(pages.take_changed()) == Numbers{0});
   pages.put("one more", "", 0);
   CHECK(pages.count() == 3);
 }
 
-TEST_CASE("a page lists the pages that changed before it or with it") {
+TEST_CASE("the last page of a publication lists the pages that changed before it or with it") {
   Pages pages("robot", kLife);
-  put_numbered(pages, 0, 2 * Pages::kPageSize);
+  put_numbered(pages, 0, 3 * kFirst);
   CHECK(pages.close_epoch() == kLife + 1);
   auto changed = pages.take_changed();
-  REQUIRE(changed.size() == 2);
-  CHECK(others_of(changed[0]) == std::vector<std::string>{"1: 8"});
-  CHECK(others_of(changed[1]) == std::vector<std::string>{"0: 8"});
+  REQUIRE(changed.size() == 3);
+  CHECK(others_of(changed[0]) == std::vector<std::string>{"2: 8"});
+  CHECK(others_of(changed[1]) == std::vector<std::string>{"2: 8"});
+  CHECK(others_of(changed[2]) == std::vector<std::string>{"1: 8", "0: 8"});
   pages.put("f0", "f1", 0);
   CHECK(pages.close_epoch() == kLife + 2);
-  pages.put("f100", "f1", 0);
+  pages.put("f" + std::to_string(kFirst), "f1", 0);
   CHECK(pages.close_epoch() == kLife + 3);
   changed = pages.take_changed();
   REQUIRE(changed.size() == 2);
   CHECK(changed[0].epoch == kLife + 3);
   CHECK(changed[1].epoch == kLife + 3);
+  CHECK(others_of(changed[0]) == std::vector<std::string>{"1: 10"});
+  // Page 2 did not change since all pages were published.
+  CHECK(others_of(changed[1]) == std::vector<std::string>{"0: 10"});
   pages.put("f0", "", 0);
   CHECK(pages.close_epoch() == kLife + 4);
   changed = pages.take_changed();
@@ -136,8 +165,11 @@ TEST_CASE("a page lists the pages that changed before it or with it") {
 
 TEST_CASE("a page lists a limited number of pages that changed with it") {
   Pages pages("robot", kLife);
-  put_numbered(pages, 0, 30 * Pages::kPageSize);
-  for (const Page& page : pages.take_changed()) CHECK(page.others.size() == Pages::kOthers);
+  put_numbered(pages, 0, 30 * kFirst);
+  const auto changed = pages.take_changed();
+  REQUIRE(changed.size() > Pages::kOthers + 1);
+  CHECK(changed.front().others.size() == 1);
+  CHECK(changed.back().others.size() == Pages::kOthers);
 }
 
 // Pages in transit. A later page may replace an earlier one of the same number.

@@ -104,9 +104,8 @@ TEST_CASE("loaded frames are published once as one epoch") {
   for (int i = 0; i < 100; ++i) frames.push_back({"f" + std::to_string(i), "arm", {}});
   REQUIRE(arms.partition.load(frames, kNow));
   const auto pages = arms.partition.take_pages();
-  REQUIRE(pages.size() == 2);
-  CHECK(pages[0].epoch == kLife + 1);
-  CHECK(pages[1].epoch == kLife + 1);
+  REQUIRE(pages.size() > 2);
+  for (const Page& page : pages) CHECK(page.epoch == kLife + 1);
   CHECK(arms.partition.take_pages().empty());
   Replica other;
   other.apply(pages);
