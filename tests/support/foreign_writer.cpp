@@ -39,7 +39,7 @@ class MutedTransport final : public fastdds::SendFilter {
   }
 
  private:
-  [[nodiscard]] bool may_send(const fastdds::ertps::Locator_t&) const override {
+  [[nodiscard]] bool may_send(const fastdds::ertps::Locator_t&) override {
     return !*descriptor_.muted;
   }
   void heard(const fastdds::ertps::Locator_t&) const override {}

@@ -324,7 +324,7 @@ class SendFilter : public etransport::ChainingTransport {
   }
 
  private:
-  [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) const = 0;
+  [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) = 0;
   virtual void heard(const ertps::Locator_t& from) const = 0;
 
   // A datagram that may not be sent counts as sent, like one that is lost on the way.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "transport/fastdds/fair_share.hpp"
+#include "transport/fastdds/outgoing.hpp"
 #include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
@@ -30,10 +31,11 @@ struct DataPorts {
 
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
-                  DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
+                  bool of_client, DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
                   std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
+        client(of_client),
         data_ports(ports_of_data),
         discovering(std::move(one_by_one)),
         gate(std::move(inward)),
@@ -51,6 +53,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   }
 
   Flag open;
+  bool client;
   DataPorts data_ports;
   std::shared_ptr<std::mutex> discovering;  // held while a message of discovery is handled, or null
   std::shared_ptr<Gate> gate;
@@ -71,9 +74,19 @@ std::uint32_t host_of(const ertps::Locator_t& locator) {
 class GatedTransport final : public SendFilter {
  public:
   explicit GatedTransport(const GatedDescriptor& descriptor)
-      : SendFilter(descriptor), descriptor_(descriptor) {}
+      : SendFilter(descriptor), descriptor_(descriptor), pace_(descriptor.client) {}
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+#if TFDUDE_FASTDDS_MAJOR == 2
+  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
+            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    announces_ = is_announcement(bytes, size);
+    return SendFilter::send(through, bytes, size_without_statistics(bytes, size), begin, end,
+                            deadline);
+  }
+#endif
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
@@ -93,8 +106,9 @@ class GatedTransport final : public SendFilter {
   }
 
  private:
-  [[nodiscard]] bool may_send(const ertps::Locator_t& to) const override {
+  [[nodiscard]] bool may_send(const ertps::Locator_t& to) override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
+    if (announces_ && !pace_.may_send(to, AnnouncementPace::Clock::now())) return false;
     const std::uint32_t host = host_of(to);
     return host == 0 || descriptor_.throttle->may_send(host, to.port, SendThrottle::Clock::now());
   }
@@ -105,10 +119,25 @@ class GatedTransport final : public SendFilter {
   }
 
   GatedDescriptor descriptor_;
+  // Used by one thread at a time: Fast DDS sends with a lock of the participant held.
+  AnnouncementPace pace_;
+  bool announces_ = false;  // what is being sent
 };
 
 etransport::TransportInterface* GatedDescriptor::create_transport() const {
   return new GatedTransport(*this);
+}
+
+// What Fast DDS adds to each announcement about the process, for its tools, and the endpoints for
+// liveliness, which no topic of ours has.
+void leave_out_unused(edds::DomainParticipantQos& qos) {
+  auto& properties = qos.properties().properties();
+  const auto is_physical = [](const auto& property) {
+    return property.name().rfind("fastdds.physical_data.", 0) == 0;
+  };
+  properties.erase(std::remove_if(properties.begin(), properties.end(), is_physical),
+                   properties.end());
+  qos.wire_protocol().builtin.use_WriterLivelinessProtocol = false;
 }
 
 // As Fast DDS would by default, but for the multicast locator that this participant listens to.
@@ -175,12 +204,13 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
     data_ports.step = port.participantIDGain;
   }
   auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;
+  leave_out_unused(qos);
   if (client) announce_eagerly(qos);
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, data_ports, discovering, gate_,
-                                                  life_signs_);
+    transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
+                                                  gate_, life_signs_);
   }
 }
 

@@ -23,8 +23,8 @@ namespace tfdude::fastdds {
 ///   another thread may be faster. So a client does not listen to multicast: all messages come to
 ///   one socket, in order. It then discovers later participants by its own announcements, and does
 ///   not discover other clients.
-/// - A client announces itself every 2 ms at first; later, and a server always, as set in the
-///   profile.
+/// - A client announces itself every 2 ms at first, at longer and longer intervals
+///   (AnnouncementPace); later, and a server always, as set in the profile.
 /// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing,
 ///   and nobody is told. So it searches through all ports of the domain here, for 120 participants,
 ///   from its number in this process on, which Fast DDS 2.9 counts up.
@@ -49,6 +49,10 @@ class DiscoveryGate {
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
+
+  /// Drops what the participant sends. When it leaves, it says so at the end, and nobody need be
+  /// told of each endpoint before.
+  void close() { open_->store(false, std::memory_order_relaxed); }
 
  private:
   const std::shared_ptr<Gate> gate_;

@@ -10,7 +10,6 @@
 #include "base/log.hpp"
 #include "base/mutex.hpp"
 #include "transport/fastdds/announcement.hpp"
-#include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/topics.hpp"
 
@@ -87,17 +86,16 @@ Result<void> FastDdsTransport::create_participant() {
   if (!options_.discovery_server.empty()) {
     if (auto used = use_discovery_server(qos, options_.discovery_server); !used) return used;
   }
-  DiscoveryGate discovery_gate(gate_, life_signs_);
   // The time may be published by a client.
   const bool owners_only = options_.partition.empty() && !handler_->wants_clock();
-  discovery_gate.prepare(qos, options_.domain, owners_only);
+  discovery_gate_.prepare(qos, options_.domain, owners_only);
   participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
       options_.domain, qos, &participant_listener_, edds::StatusMask::none());
   if (participant_ == nullptr) {
     return fail(Errc::kTransport,
                 "Fast DDS could not join domain " + std::to_string(options_.domain));
   }
-  discovery_gate.open();
+  discovery_gate_.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   return create_topics(*participant_, topics_) ? Result<void>() : not_created("the topics");
 }
@@ -232,6 +230,8 @@ void FastDdsTransport::stop() {
   gate_->close();
   worker_->stop();
   participant_->set_listener(nullptr);
+  // A server of discovery has to be told of each endpoint.
+  if (options_.discovery_server.empty()) discovery_gate_.close();
   requests_.reset();
   changes_.reset();
   updates_.reset();
@@ -246,11 +246,19 @@ void FastDdsTransport::stop() {
   directory_writer_.reset();
   presence_writer_.reset();
   participant_->delete_contained_entities();
+  discovery_gate_.open();
   edds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
   participant_ = nullptr;
 }
 
 // --- sending ---
+
+// Both writers at once, whichever is needed now: one that is created later may not be discovered,
+// for instance while a discovery server cannot be reached. But a client that asks for its frames
+// mostly comes with one question.
+void FastDdsTransport::prepare(const std::string& partition) {
+  senders_->prepare(partition, handler_->wants_pages() || !options_.discovery_server.empty());
+}
 
 void FastDdsTransport::announce(const Presence& presence) {
   contact_->announce(*presence_writer_, presence);

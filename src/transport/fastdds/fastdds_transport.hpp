@@ -15,6 +15,7 @@
 #include "transport/fastdds/clock_channel.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/contact.hpp"
+#include "transport/fastdds/discovery_gate.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/owned_filter.hpp"
@@ -44,7 +45,7 @@ class FastDdsTransport final : public Transport {
   Result<void> serve(const std::string& partition) override;
   void announce(const Presence& presence) override;
   void publish(const Page& page) override;
-  void prepare(const std::string& partition) override { senders_->prepare(partition); }
+  void prepare(const std::string& partition) override;
   Result<void> send(const std::string& partition, const Request& request,
                     Deadline deadline) override {
     return senders_->send(partition, request, deadline);
@@ -134,6 +135,7 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<FastDdsCounters> counters_;
   TransportHandler* handler_ = nullptr;
   const std::shared_ptr<LifeSigns> life_signs_ = std::make_shared<LifeSigns>();
+  DiscoveryGate discovery_gate_{gate_, life_signs_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);

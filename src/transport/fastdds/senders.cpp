@@ -24,11 +24,9 @@ WriterTable<std::string> Senders::writers_of(edds::Topic* topic, const char* pro
   });
 }
 
-// Both at once, whichever is needed now: a writer that is created later may not be discovered, for
-// instance while a discovery server cannot be reached.
-void Senders::prepare(const std::string& partition) {
+void Senders::prepare(const std::string& partition, bool changes) {
   if (parts_.access.may_look()) (void)requests_.open(partition);
-  if (parts_.access.may_change(partition)) (void)changes_.open(partition);
+  if (changes && parts_.access.may_change(partition)) (void)changes_.open(partition);
 }
 
 Result<void> Senders::send(const std::string& partition, const Request& request,

@@ -34,7 +34,9 @@ class Senders {
 
   explicit Senders(const Parts& parts) : parts_(parts) {}
 
-  void prepare(const std::string& partition);
+  /// Starts to connect to a partition.
+  /// @param changes  also for requests that change something
+  void prepare(const std::string& partition, bool changes);
   // As those of Transport.
   [[nodiscard]] Result<void> send(const std::string& partition, const Request& request,
                                   Deadline deadline);
