@@ -41,6 +41,9 @@ function(tfdude_add_tests target)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
+  if(CMAKE_CROSSCOMPILING)
+    math(EXPR ARG_TIMEOUT "20 * ${ARG_TIMEOUT}")  # an emulator runs them
+  endif()
   add_executable(${target} ${ARG_SOURCES})
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   target_link_libraries(${target} PRIVATE test_support tfdude_open Catch2::Catch2WithMain tfdude_options
