@@ -118,7 +118,7 @@ def _core():
     for shape in ("2/10", "30/100", "30/1000", "1000/10000"):
         frames = shape.split("/")[1]
         yield Target("Core", f"set an edge of {frames} frames: by handle / tf2",
-                     ratio_of(f"core/set/ours_by_handle/{shape}", f"core/set/tf2/{shape}"), 0.1)
+                     ratio_of(f"core/set/ours_by_handle/{shape}", f"core/set/tf2/{shape}"), 0.09)
     for who, what in (("ours_forest", "in the forest"), ("ours", "through a node")):
         yield Target("Core", f"add and remove a leaf in 100,000 frames, {what}",
                      value_of(f"core/add_remove/{who}/1000/100000", "median", microseconds), 0.2,
@@ -126,6 +126,8 @@ def _core():
 
 
 def _history():
+    yield Target("History", "add a sample to an edge with a full history: by handle / tf2",
+                 ratio_of("core/set_history/ours_by_handle/2/100", "core/set_history/tf2/2/100"), 0.12)
     for operation, what in (("lookup_at", "1 kHz"), ("lookup_at_100hz", "100 Hz")):
         for depth in (2, 8, 30):
             ours, tf2 = (f"core/{operation}/{who}/{depth}/100" for who in ("ours_by_handle", "tf2"))
@@ -149,7 +151,7 @@ def _contention():
     yield Target("Contention", "torn reads", value_of("contention/ours/torn", "max"), 0,
                  unit="reads")
     yield Target("Contention", "writer's batch of 100 edges",
-                 value_of("contention/ours/batch", "median", microseconds), 5, unit="µs")
+                 value_of("contention/ours/batch", "median", microseconds), 3, unit="µs")
 
 
 def _many():
@@ -170,8 +172,12 @@ WHY = {
         "Planning and the codec at both ends take two to four microseconds of a round trip; on one "
         "core they are not hidden by waiting.",
     "Core: set an edge":
-        "The one locked instruction of the writers' lock takes two fifths of it: it waits until the "
-        "290 bytes of the update before have left the store buffer.",
+        "The locked instruction of the writers' lock takes 5 ns, and waits for the stores before it. A "
+        "record that is copied under such a lock, without any check, takes 8 ns: 0.04 of tf2.",
+    "History: add a sample":
+        "Of 30 ns, the lock takes 6, the version for readers 6, the comparison of the covariance with "
+        "that of the sample before 3, and dropping the oldest sample 2. A record and a sample that are "
+        "copied under a lock into a ring, without any check, take 10 ns: 0.05 of tf2.",
     "History: lookup between samples":
         "Each edge is interpolated on its geodesic, while tf2 interpolates translations linearly. The "
         "covariances of both samples are also transported to the instant, which takes two products of "
@@ -183,8 +189,13 @@ WHY = {
         "Two processors start all 32. Each daemon reads its configuration (0.08 s), takes in the structure of 31 "
         "others (0.1 s) and sends its own to them; 32 daemons of one frame each take 1.5 s.",
     "Core: add and remove a leaf in 100,000 frames, through a node":
-        "A node also plans, keeps the pages for other participants, and wakes the thread that publishes "
-        "them.",
+        "The forest takes 0.12 µs of it. A node also plans the request, keeps the pages for other "
+        "participants, and wakes the thread that publishes them. Its profile is flat: strings that are "
+        "copied, hashed and compared take a seventh, memory a tenth, locks and clocks 5 % each.",
+    "Contention: writer's batch":
+        "The reader has the versions of 30 of the edges in the cache of its processor, and the writer "
+        "has to take these lines from it. Without a reader the batch takes 1.5 µs; 100 records that are "
+        "copied under a lock take 0.5 µs.",
 }
 
 GROUPS = tuple(dict.fromkeys(target.group for target in ALL))

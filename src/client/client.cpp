@@ -72,13 +72,13 @@ Result<void> Client::forget(const std::string& partition) {
 }
 
 Result<void> Client::update(const std::string& id, const Transform& X_PC,
-                            std::optional<Time> stamp) {
+                            const std::optional<Time>& stamp) {
   auto updated = participant_->forest().update(id, X_PC, stamp);
   if (updated || !Writes::is_elsewhere(updated.error())) return updated;
   return participant_->writes().update({{id, X_PC}}, stamp);
 }
 
-Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<Time> stamp) {
+Result<void> Client::update(Handle frame, const Transform& X_PC, const std::optional<Time>& stamp) {
   if (auto updated = participant_->forest().update(frame, X_PC, stamp);
       updated || !Writes::is_elsewhere(updated.error())) {
     return updated;
@@ -90,11 +90,13 @@ Result<void> Client::update(Handle frame, const Transform& X_PC, std::optional<T
   return participant_->writes().update({{info->id, X_PC}}, stamp);
 }
 
-Result<void> Client::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
+Result<void> Client::update(const std::vector<EdgeUpdate>& edges,
+                            const std::optional<Time>& stamp) {
   return participant_->writes().update(edges, stamp);
 }
 
-Result<void> Client::update(const std::vector<HandleUpdate>& edges, std::optional<Time> stamp) {
+Result<void> Client::update(const std::vector<HandleUpdate>& edges,
+                            const std::optional<Time>& stamp) {
   auto updated = participant_->forest().update(edges, stamp);
   if (updated || !Writes::is_elsewhere(updated.error())) return updated;
   std::vector<EdgeUpdate> named;

@@ -124,16 +124,16 @@ class Forest {
   ///   which is not known yet), kTooOld (older than the kept history), kStampTaken (another sample
   ///   has the stamp).
   [[nodiscard]] Result<void> update(std::string_view id, const Transform& X_PC,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
 
   /// Sets many edges as one commit, with one stamp: all or, on an error, none. No reader sees a
   /// part.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
   /// As update(), with correlations.
   /// @return as update(); kInvalidInput also for an invalid correlation, naming the source.
   [[nodiscard]] Result<void> update_correlated(const std::vector<CorrelatedUpdate>& edges,

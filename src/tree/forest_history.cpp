@@ -28,11 +28,6 @@ Result<void> check_timing(const EdgeTiming& timing) {
   return {};
 }
 
-tl::unexpected<Error> no_time(const HeldVersion& edge) {
-  return fail(Errc::kNotYet, "frame " + quote(edge.name->text) +
-                                 ": the owner's clock is external, and has no time yet");
-}
-
 }  // namespace
 
 Forest::Impl::~Impl() {
@@ -41,90 +36,6 @@ Forest::Impl::~Impl() {
     delete frames_.newest_value(slot).samples;
     delete frames_.newest_value(slot).correlation;
   }
-}
-
-Result<std::int64_t> Forest::Impl::stamp_for(const std::uint32_t* slots, std::size_t count,
-                                             std::optional<Time> given) {
-  if (given) {
-    if (auto ok = check_stamp(given); !ok) return tl::unexpected(std::move(ok.error()));
-    const std::int64_t stamp = nanoseconds(*given);
-    for (std::size_t i = 0; i < count; ++i) {
-      auto ok = check_ahead(frames_.newest_value(slots[i]), stamp);
-      if (!ok) return tl::unexpected(std::move(ok.error()));
-    }
-    return stamp;
-  }
-  bool moving = false;
-  std::int64_t newest = kAlways;
-  for (std::size_t i = 0; i < count; ++i) {
-    const HeldVersion& edge = frames_.newest_value(slots[i]);
-    moving = moving || edge.moving() || timing_of(edge).moving;
-    newest = std::max(newest, edge.stamp);
-  }
-  if (!moving) return kAlways;
-  if (!clock_.is_there()) {
-    return fail(Errc::kInvalidInput, "frame " + quote(frames_.newest_value(slots[0]).name->text) +
-                                         " is dynamic: its update needs a stamp");
-  }
-  const auto now = clock_.now();
-  if (!now) return no_time(frames_.newest_value(slots[0]));
-  // If the clock was set back, time advances as little as possible.
-  return newest == kAlways ? *now : std::max(*now, saturating_add(newest, 1));
-}
-
-Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
-  const std::int64_t limit = timing_of(edge).max_ahead.count();
-  if (!clock_.is_there() || limit == std::chrono::nanoseconds::max().count()) return {};
-  if (clock_.surely_admits(stamp, limit)) return {};
-  const auto now = clock_.read();
-  if (!now) return no_time(edge);
-  const std::int64_t ahead = saturating_subtract(stamp, *now);
-  if (ahead <= limit) return {};
-  edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);
-  return fail(Errc::kInvalidInput,
-              "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
-                  ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +
-                  " ahead of the owner's clock, " + to_string(time_of(*now)) + ", more than the " +
-                  in_milliseconds(timing_of(edge).max_ahead) + " allowed");
-}
-
-void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
-  const HeldVersion& old = frames_.newest_value(slot);
-  if (stamp == kAlways) {
-    end_revision(push_held(slot, value.X_PC));
-  } else if (!old.moving() || stamp > old.stamp) {
-    append_sample(old, value, stamp);
-  } else if (stamp < old.stamp - old.samples->timing().span.count()) {
-    restart_history(old, value, stamp);
-  } else {
-    insert_sample(old, value, stamp);
-  }
-}
-
-void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& value,
-                                 std::int64_t stamp) {
-  SampleHistory* samples = newest.samples;
-  if (samples == nullptr) {
-    samples = new SampleHistory(default_timing_);
-  } else {
-    // First, so that the ring buffer need not grow for it. At least two samples are kept, so this
-    // is not the newest.
-    if (samples->count() >= samples->timing().count) samples->drop_oldest(reclaimer_.samples());
-    if (samples->full()) {
-      samples = samples->grown().release();
-      reclaimer_.supersede(newest.samples);
-    }
-  }
-  HeldVersion& fresh = push_held(newest.slot, value.X_PC);
-  fresh.samples = samples;
-  append_to(fresh, value, stamp);
-  drop_samples(*samples, stamp);
-}
-
-void Forest::Impl::append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp) {
-  fresh.stamp = stamp;
-  fresh.number = fresh.samples->next();
-  fresh.samples->append(stamp, fresh.commit, value, reclaimer_.samples());
 }
 
 void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& value,
@@ -171,15 +82,6 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   fresh.number = samples->next() - 1;
   if (newest.samples->has_instants(place)) fresh.history = fresh.commit;
   drop_samples(*samples, newest.stamp);
-}
-
-void Forest::Impl::drop_samples(SampleHistory& samples, std::int64_t newest) {
-  const std::int64_t limit = newest - samples.timing().span.count();
-  const std::size_t most = samples.timing().count;
-  while (samples.count() > most || samples.first_stamp() < limit) {
-    samples.drop_oldest(reclaimer_.samples());
-  }
-  keep_to_limit();
 }
 
 void Forest::Impl::give_back(SampleHistory* samples) {

@@ -61,9 +61,10 @@ class Forest::Impl {
   void commit() TFDUDE_REQUIRES(mutex_);
   void commit_structure() TFDUDE_REQUIRES(mutex_);
 
-  /// Updates one edge, given by its newest version.
-  [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
-                                        std::optional<Time> stamp) TFDUDE_REQUIRES(mutex_);
+  /// Updates one edge, given by its id or its handle. Takes the lock.
+  template <class Frame>
+  [[nodiscard]] Result<void> update_one(Frame frame, const Transform& X_PC,
+                                        const std::optional<Time>& stamp);
   [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr || default_timing_.moving;
   }
@@ -71,7 +72,7 @@ class Forest::Impl {
   /// Updates all as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>
   [[nodiscard]] Result<void> update_all(const std::vector<Update>& edges, Frame frame,
-                                        std::optional<Time> stamp) TFDUDE_REQUIRES(mutex_);
+                                        const std::optional<Time>& stamp) TFDUDE_REQUIRES(mutex_);
   /// The edges' values, with the given parts replaced.
   [[nodiscard]] Result<std::vector<EdgeUpdate>> completed(
       const std::vector<PartialUpdate>& edges) const TFDUDE_REQUIRES(mutex_);
@@ -80,8 +81,9 @@ class Forest::Impl {
 
   /// The stamp for an update of all these edges: the given one, or, if one is needed, the clock's,
   /// later than all their samples.
-  [[nodiscard]] Result<std::int64_t> stamp_for(const std::uint32_t* slots, std::size_t count,
-                                               std::optional<Time> given) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] Result<std::int64_t> stamp_for(const HeldVersion* const* edges, std::size_t count,
+                                               const std::optional<Time>& given)
+      TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr ? edge.samples->timing() : default_timing_;
   }
@@ -166,7 +168,12 @@ class Forest::Impl {
 
  private:
   template <class T>
-  T& push(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  T& push(Head& head) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
+                                        const std::optional<Time>& stamp) TFDUDE_REQUIRES(mutex_);
+  /// The error for a value that is not finite.
+  template <class Frame>
+  [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
   void append_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void restart_history(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
@@ -195,8 +202,75 @@ class Forest::Impl {
   Reclaimer reclaimer_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<const Name*> released_names_ TFDUDE_GUARDED_BY(mutex_);  // by the current commit
   std::vector<std::uint32_t> free_slots_ TFDUDE_GUARDED_BY(mutex_);
-  std::vector<std::uint32_t> to_update_
+  std::vector<const HeldVersion*> to_update_
       TFDUDE_GUARDED_BY(mutex_);  // edges of the current update; kept to reuse its memory
 };
+
+// In the header, so that they are inlined into an update.
+
+template <class T>
+T& Forest::Impl::push(Head& head) {
+  Version* old = head.load(std::memory_order_relaxed);
+  T* fresh = reclaimer_.take<T>();
+  fresh->commit = frames_.commit_being_made();
+  fresh->older = old;
+  fresh->name = old->name;
+  fresh->above = old->above;
+  fresh->parent = old->parent;
+  fresh->depth = old->depth;
+  fresh->owner = old->owner;
+  fresh->slot = old->slot;
+  fresh->generation = old->generation;
+  reclaimer_.supersede(old);
+  // Readers skip the fresh version by its number until commit(), so it may be filled in later.
+  head.store(fresh, std::memory_order_release);
+  return *fresh;
+}
+
+inline HeldVersion& Forest::Impl::push_held(std::uint32_t slot, const Transform& X_PC) {
+  HeldVersion& fresh = push<HeldVersion>(frames_.head(slot));
+  fresh.owner = kHeldHere;
+  fresh.X_PC = X_PC;
+  if (fresh.older->held()) {
+    const auto& before = static_cast<const HeldVersion&>(*fresh.older);
+    fresh.stamp = before.stamp;
+    fresh.number = before.number;
+    fresh.samples = before.samples;
+    fresh.correlation = before.correlation;
+    fresh.history = before.history;
+  } else {
+    fresh.stamp = kAlways;
+    fresh.samples = nullptr;
+    fresh.correlation = nullptr;
+    fresh.history = fresh.commit;
+  }
+  return fresh;
+}
+
+inline Version& Forest::Impl::push_remote(std::uint32_t slot) {
+  return push<Version>(frames_.head(slot));
+}
+
+inline void Forest::Impl::commit() {
+  show_commit();
+  tell_commit();
+}
+
+inline void Forest::Impl::commit_structure() {
+  show_commit();
+  structure_version_.fetch_add(1, std::memory_order_release);
+  tell_commit();
+}
+
+inline void Forest::Impl::show_commit() {
+  frames_.show_commit();
+  // Only now: a reader of the previous commit may still reach a name through the version it sees.
+  for (const Name* name : released_names_) {
+    free_slots_.push_back(name->slot);
+    frames_.drop_name(name);
+  }
+  released_names_.clear();
+  if (reclaimer_.is_due()) reclaimer_.collect(frames_);
+}
 
 }  // namespace tfdude

@@ -85,10 +85,17 @@ class Frames {
   [[nodiscard]] const Version* newest_named(std::string_view id) const;
 
   /// The newest version of the frame if it is held here, otherwise null.
-  [[nodiscard]] const Version* newest_held(Handle frame) const {
+  [[nodiscard]] const HeldVersion* newest_held(Handle frame) const {
     if (frame.slot >= slots_.size()) return nullptr;
     const Version& version = newest(frame.slot);
-    return version.held() && version.generation == frame.generation ? &version : nullptr;
+    return version.held() && version.generation == frame.generation
+               ? static_cast<const HeldVersion*>(&version)
+               : nullptr;
+  }
+  [[nodiscard]] const HeldVersion* newest_held(std::string_view id) const {
+    const Version* version = newest_named(id);
+    return version != nullptr && version->held() ? static_cast<const HeldVersion*>(version)
+                                                 : nullptr;
   }
 
   /// Checks that the frame exists and is held here. @return kUnknownFrame, kNotOwner.

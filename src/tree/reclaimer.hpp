@@ -26,6 +26,9 @@ class Reclaimer {
     }
   }
 
+  /// See Pool::prefetch().
+  void prefetch_held(std::size_t ahead) const { held_pool_.prefetch(ahead); }
+
   // Takes an object superseded by the current commit, or by an earlier one. Ignores null.
   void supersede(Version* version) {
     ++superseded_;

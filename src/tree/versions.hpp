@@ -49,15 +49,16 @@ struct EdgeCorrelation {
   std::uint64_t retire_tag = 0;
 };
 
-/// A version of an edge whose value is held here.
-struct HeldVersion : Version {
+/// A version of an edge whose value is held here. The fields are ordered for lookups: a climb needs
+/// the first two cache lines, which end with the pose, and then the covariance.
+struct alignas(64) HeldVersion : Version {
   std::int64_t stamp = kAlways;            // of the newest sample
-  std::uint64_t number = 0;                // its number in the history
-  SampleHistory* samples = nullptr;        // null: no history and no timing of its own
   EdgeCorrelation* correlation = nullptr;  // null: independent
+  Transform X_PC;
+  std::uint64_t number = 0;          // of the newest sample in the history
+  SampleHistory* samples = nullptr;  // null: no history and no timing of its own
   // The commit with which its values began; earlier values belong to another edge.
   std::uint64_t history = 0;
-  Transform X_PC;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
   /// Whether it has no value, as its history was cleared.

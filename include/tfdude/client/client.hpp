@@ -101,17 +101,17 @@ class TFDUDE_EXPORT Client {
   /// time yet rejects samples that need it, with kNotYet.
   /// @return kUnknownFrame, kTooOld (older than the kept history), kStampTaken.
   [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
   [[nodiscard]] Result<void> update(Handle frame, const Transform& X_PC,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
 
   /// Updates many edges. Each owner applies its share as one atomic commit. All samples have the
   /// same stamp, so a lookup at an instant sees all of them or none, whoever owns them. Another
   /// process accepts at most kMaxItems edges at once.
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
   [[nodiscard]] Result<void> update(const std::vector<HandleUpdate>& edges,
-                                    std::optional<Time> stamp = std::nullopt);
+                                    const std::optional<Time>& stamp = std::nullopt);
 
   /// Sets parts of edges: translation, rotation or covariance. The owner takes the other parts from
   /// the edge's newest value, in the commit of the update. Otherwise as update().
