@@ -84,7 +84,8 @@ void interpolate(const Transform& X0, const Transform& X1, double s, Transform& 
   }
   kernel::Edge edge{};
   kernel::Blend one{kernel::edge_of(X0), kernel::edge_of(X1), s, kernel::numbers_of(X), &edge};
-  kernel::functions().blend_with_covariance(&one, 1);
+  kernel::Blend* const all[] = {&one};
+  kernel::functions().blend_with_covariance(all, 1);
   if (!one.near) return interpolate_far(X0, X1, s, X);
   if (edge.upper == one.X0.upper) {
     X.covariance = X0.covariance;
@@ -104,7 +105,8 @@ void interpolate_far(const Transform& X0, const Transform& X1, double s, Transfo
 void interpolate(const Pose& X0, const Pose& X1, double s, Pose& X) {
   kernel::Edge edge{};
   kernel::Blend one{kernel::edge_of(X0), kernel::edge_of(X1), s, kernel::numbers_of(X), &edge};
-  kernel::functions().blend_poses(&one, 1);
+  kernel::Blend* const all[] = {&one};
+  kernel::functions().blend_poses(all, 1);
   if (!one.near) interpolate_far(X0, X1, s, X);
 }
 

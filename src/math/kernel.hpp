@@ -83,8 +83,8 @@ struct Functions {
   /// Ad(X) Σ Ad(X)ᵀ, both as upper triangles, row by row.
   void (*transport)(const Columns& X, const double* upper, double* transported);
   /// As interpolate(), for the pairs that are near.
-  void (*blend_poses)(Blend* all, std::size_t count);
-  void (*blend_with_covariance)(Blend* all, std::size_t count);
+  void (*blend_poses)(Blend* const* all, std::size_t count);
+  void (*blend_with_covariance)(Blend* const* all, std::size_t count);
   void (*add_fourth)(Fourth& terms);
 };
 

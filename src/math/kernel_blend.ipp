@@ -253,8 +253,8 @@ inline void blend_covariance(const Way& way, const Blend& one) {
 }
 
 // Of the edges that are near.
-inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, const Between& b,
-                              V4 s) {
+inline void blend_covariances(Blend* const* some, std::size_t count, const Poses& X0,
+                              const Between& b, V4 s) {
   // Up to here, what bulged() leaves out is below 1e-8.
   constexpr double kQuarticEnds = 1e-3;
   const V4 distance2 = dot(b.way, b.way);
@@ -263,7 +263,7 @@ inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, c
   bool bulges = false;
   bool blends = false;
   for (std::size_t i = 0; i < count; ++i) {
-    const Blend& one = some[i];
+    const Blend& one = *some[i];
     one.edge->upper = one.X0.upper;
     if (!one.near) continue;
     const bool same = same_covariance(one);
@@ -280,7 +280,7 @@ inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, c
   const Ways xi = ways(X0, b);
   if (bulges) {
     const double* upper0[4];
-    for (std::size_t i = 0; i < 4; ++i) upper0[i] = some[i < count ? i : 0].X0.upper;
+    for (std::size_t i = 0; i < 4; ++i) upper0[i] = some[i < count ? i : 0]->X0.upper;
     V4 upper[21];
     bulged(upper0, xi, s, upper);
     for (const int first : kGroups) store_lanes(upper + first, bulging, first);
@@ -290,38 +290,39 @@ inline void blend_covariances(Blend* some, std::size_t count, const Poses& X0, c
     blend_covariance({{xi.rho.x[i], xi.rho.y[i], xi.rho.z[i]},
                       {xi.theta.x[i], xi.theta.y[i], xi.theta.z[i]},
                       xi.angle2[i]},
-                     some[i]);
+                     *some[i]);
   }
 }
 
 template <bool kWithCovariance>
-inline void blend_all(Blend* all, std::size_t count) {
+inline void blend_all(Blend* const* all, std::size_t count) {
   for (std::size_t from = 0; from < count; from += 4) {
     const std::size_t here = count - from < 4 ? count - from : 4;
-    Blend* some = all + from;
+    Blend* const* some = all + from;
     const double* pose0[4];
     const double* pose1[4];
     for (std::size_t i = 0; i < 4; ++i) {
-      const Blend& one = some[i < here ? i : 0];
+      const Blend& one = *some[i < here ? i : 0];
       pose0[i] = one.X0.pose;
       pose1[i] = one.X1.pose;
     }
-    const auto part = [&](std::size_t i) { return some[i < here ? i : 0].s; };
+    const auto part = [&](std::size_t i) { return some[i < here ? i : 0]->s; };
     const V4 s{part(0), part(1), part(2), part(3)};
     const Poses X0 = load_poses(pose0);
     const Poses X1 = load_poses(pose1);
     const Between b = between(X0, X1);
     double* out[4] = {};
     for (std::size_t i = 0; i < here; ++i) {
-      some[i].near = b.sine2[i] < kSmallSine2;
-      if (!some[i].near) continue;
-      out[i] = some[i].X;
-      some[i].edge->pose = some[i].X;
+      Blend& one = *some[i];
+      one.near = b.sine2[i] < kSmallSine2;
+      if (!one.near) continue;
+      out[i] = one.X;
+      one.edge->pose = one.X;
     }
     store_poses(go(X0, X1, b, s), out);
     if constexpr (kWithCovariance) blend_covariances(some, here, X0, b, s);
   }
 }
 
-void blend_poses(Blend* all, std::size_t count) { blend_all<false>(all, count); }
-void blend_both(Blend* all, std::size_t count) { blend_all<true>(all, count); }
+void blend_poses(Blend* const* all, std::size_t count) { blend_all<false>(all, count); }
+void blend_both(Blend* const* all, std::size_t count) { blend_all<true>(all, count); }

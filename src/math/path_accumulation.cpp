@@ -13,13 +13,10 @@ namespace {
 
 using kernel::Blend;
 
-// The number of groups in which the kernel interpolates.
-std::size_t groups(std::size_t blends) { return (blends + 3) / 4; }
-
-void blend_all(Blend* all, std::size_t count, const Pose*) {
+void blend_all(Blend* const* all, std::size_t count, const Pose*) {
   kernel::functions().blend_poses(all, count);
 }
-void blend_all(Blend* all, std::size_t count, const Transform*) {
+void blend_all(Blend* const* all, std::size_t count, const Transform*) {
   kernel::functions().blend_with_covariance(all, count);
 }
 
@@ -51,22 +48,31 @@ void PathAccumulation<Value>::up_between(const TransformParts& X0, const Transfo
 }
 
 template <class Value>
-void PathAccumulation<Value>::blend() {
-  blend_all(blends_.data(), blend_count_, static_cast<const Value*>(nullptr));
-  for (std::size_t i = 0; i < blend_count_; ++i) {
-    const Blend& one = blends_[i];
+void PathAccumulation<Value>::blend(PathAccumulation* other) {
+  // All at once, because four take hardly longer than one.
+  std::array<Blend*, 2 * std::tuple_size_v<decltype(blends_)>> all;
+  std::size_t count = 0;
+  for (PathAccumulation* path : {this, other}) {
+    for (std::size_t i = 0; path != nullptr && i < path->blend_count_; ++i) {
+      all[count++] = &path->blends_[i];
+    }
+    if (path != nullptr) path->blend_count_ = 0;
+  }
+  if (count == 0) return;
+  blend_all(all.data(), count, static_cast<const Value*>(nullptr));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Blend& one = *all[i];
     if (one.near) continue;
     Value X;
     blend_far(one, X);
     std::copy_n(kernel::numbers_of(X), std::is_same_v<Value, Pose> ? 7 : 28, one.X);
     *one.edge = {one.X, one.X + 7};
   }
-  blend_count_ = 0;
 }
 
 template <class Value>
 void PathAccumulation<Value>::climb() {
-  if (blend_count_ > 0) blend();
+  blend(nullptr);
   const kernel::Functions& compute = kernel::functions();
   if constexpr (std::is_same_v<Value, Transform>) {
     compute.climb_with_covariance(climbed_, {pending_.data(), count_});
@@ -78,17 +84,7 @@ void PathAccumulation<Value>::climb() {
 
 template <class Value>
 void join(PathAccumulation<Value>&& from_a, PathAccumulation<Value>&& from_b, Value& X_AB) {
-  // Four interpolations take hardly longer than one.
-  const std::size_t blends = from_a.blend_count_ + from_b.blend_count_;
-  if (blends <= from_a.blends_.size() &&
-      groups(blends) < groups(from_a.blend_count_) + groups(from_b.blend_count_)) {
-    std::copy_n(from_b.blends_.begin(), from_b.blend_count_,
-                from_a.blends_.begin() + static_cast<std::ptrdiff_t>(from_a.blend_count_));
-    from_a.blend_count_ = blends;
-    from_b.blend_count_ = 0;
-  }
-  if (from_a.blend_count_ > 0) from_a.blend();
-  if (from_b.blend_count_ > 0) from_b.blend();
+  from_a.blend(&from_b);
   const kernel::Functions& compute = kernel::functions();
   const kernel::Edges a{from_a.pending_.data(), from_a.count_};
   const kernel::Edges b{from_b.pending_.data(), from_b.count_};

@@ -63,7 +63,8 @@ class PathAccumulation {
     if (count_ == pending_.size()) climb();
   }
   void climb();
-  void blend();
+  /// Interpolates what is pending here and, unless it is null, in the other one.
+  void blend(PathAccumulation* other);
 
   kernel::Climb climbed_;
   // The edges after those, and which of them are still to be interpolated. Not zeroed, which would

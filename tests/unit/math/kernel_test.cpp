@@ -74,7 +74,8 @@ TEST_CASE("the portable kernel and that of this processor interpolate alike") {
       kernel::Edge edge{};
       kernel::Blend one{kernel::edge_of(X0), kernel::edge_of(X1), 0.01 * i, kernel::numbers_of(X),
                         &edge};
-      functions.blend_with_covariance(&one, 1);
+      kernel::Blend* const all[] = {&one};
+      functions.blend_with_covariance(all, 1);
       if (one.near) X = kernel::transform_of(edge);
       return one.near;
     };
