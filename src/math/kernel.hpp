@@ -5,7 +5,7 @@
 // The arithmetic in which lookups spend most of their time, on plain arrays. It is compiled for any
 // processor of the architecture and, on x86-64, also for those with AVX2 and FMA; the choice is
 // made at run time. With products of 3x3 matrices, edge by edge, a lookup of 30 edges with
-// covariance took 1.3 times as long as in tf2; with this kernel it takes 0.56 of tf2's time
+// covariance took 1.3 times as long as in tf2; with this kernel it takes 0.4 of tf2's time
 // (core/lookup in bench/REPORT.md).
 //
 // Matrices have three columns of four numbers. The fourth is zero, so that a column fits one AVX
