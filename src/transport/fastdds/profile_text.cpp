@@ -76,4 +76,24 @@ Result<std::string> with_own_names(const std::string& xml, const std::string& en
   return std::string(printer.CStr());
 }
 
+std::string only_profile(const std::string& xml, const std::string& name) {
+  tinyxml2::XMLDocument document;
+  if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) return {};
+  XMLElement& profiles = *document.RootElement();
+  bool transports = false;
+  for_each_child(profiles, [&](XMLElement& child) {
+    if (is(child, "participant") && child.Attribute("profile_name", name.c_str()))
+      transports = true;
+  });
+  for_each_child(profiles, [&](XMLElement& child) {
+    const bool kept = is(child, "transport_descriptors")
+                          ? transports
+                          : child.Attribute("profile_name", name.c_str()) != nullptr;
+    if (!kept) profiles.DeleteChild(&child);
+  });
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
 }  // namespace tfdude::fastdds

@@ -16,4 +16,8 @@ namespace tfdude::fastdds {
 /// @return kConfig: not well-formed XML, or without profiles.
 [[nodiscard]] Result<std::string> with_own_names(const std::string& xml, const std::string& ending);
 
+/// One profile of such a file; that of a participant with the transports described there.
+/// @param xml  well-formed, with the element "profiles" at the top
+[[nodiscard]] std::string only_profile(const std::string& xml, const std::string& name);
+
 }  // namespace tfdude::fastdds

@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/types/options.hpp"
 
+#include "base/log.hpp"
 #include "base/mutex.hpp"
 #include "transport/fastdds/builtin_profiles.hpp"
 #include "transport/fastdds/identity.hpp"
@@ -34,13 +35,17 @@ std::string builtin_text(const char* profiles) {
   return xml;
 }
 
+// Fast DDS reads and loads profiles without a lock.
+Mutex& loading() {
+  static Mutex mutex;
+  return mutex;
+}
+
 // Loads profiles into the process under unique names. They are identified by their text: the same
 // text is loaded once, and an edited file is loaded again.
 // @return the ending of their names
-Result<std::string> make_known(const std::string& xml) {
-  static Mutex mutex;
+Result<std::string> make_known(const std::string& xml) TFDUDE_REQUIRES(loading()) {
   static std::map<std::string, std::string> known;  // endings
-  const Lock lock(mutex);
   if (const auto before = known.find(xml); before != known.end()) return before->second;
   std::string ending = "@tfdude-" + std::to_string(known.size());
   const auto own = with_own_names(xml, ending);
@@ -56,19 +61,26 @@ Result<std::string> make_known(const std::string& xml) {
 // only with this policy and the dynamic one, whatever the names of the others say.
 constexpr auto kMemoryPolicy = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
 
+// A built-in profile is loaded when it is first needed: Fast DDS 2.9 compiles regular expressions
+// for each duration in it. All of them took half of the processor time of a short command.
+// @return the ending of its name
+Result<std::string> make_builtin_known(const std::string& name) TFDUDE_REQUIRES(loading()) {
+  static std::map<std::string, std::string> known;  // endings
+  if (const auto before = known.find(name); before != known.end()) return before->second;
+  auto ending = make_known(only_profile(builtin_text(kBuiltinProfiles), name));
+  if (ending) known.emplace(name, *ending);
+  return ending;
+}
+
 }  // namespace
 
 Result<Profiles> Profiles::load(const std::string& file) {
-  auto builtin = make_known(builtin_text(kBuiltinProfiles));
-  if (!builtin) {
-    return fail(Errc::kConfig, "the built-in DDS profiles: " + builtin.error().message);
-  }
-  if (file.empty()) return Profiles(*builtin, *builtin);
-  if (file == kLocalProfile) {
-    return make_known(builtin_text(kLocalProfiles)).map([&](const std::string& local) {
-      return Profiles(*builtin, local);
+  const Lock lock(loading());
+  if (file.empty()) return Profiles({});
+  if (file == kLocalProfile)
+    return make_known(builtin_text(kLocalProfiles)).map([](const std::string& ending) {
+      return Profiles(ending);
     });
-  }
   std::ifstream stream(file);
   if (!stream.good()) {
     return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");
@@ -78,12 +90,19 @@ Result<Profiles> Profiles::load(const std::string& file) {
     return fail(Errc::kConfig, "profile file " + quote(file) +
                                    " is not a valid Fast DDS profile file: " + own.error().message);
   }
-  return Profiles(*builtin, *own);
+  return Profiles(*own);
 }
 
 template <class Read>
 void Profiles::fill(const std::string& name, Read read) const {
-  if (!ok(read(kPrefix + name + own_))) (void)read(kPrefix + name + builtin_);
+  const std::string profile = kPrefix + name;
+  const Lock lock(loading());
+  if (!own_.empty() && ok(read(profile + own_))) return;
+  if (const auto builtin = make_builtin_known(profile)) {
+    (void)read(profile + *builtin);
+  } else {
+    log().error("the built-in DDS profile {}: {}", profile, builtin.error().message);
+  }
 }
 
 edds::DomainParticipantQos Profiles::participant() const {

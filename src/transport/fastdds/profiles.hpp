@@ -26,14 +26,11 @@ class Profiles {
                                            const std::string& name) const;
 
  private:
-  Profiles(std::string builtin, std::string own)
-      : builtin_(std::move(builtin)), own_(std::move(own)) {}
+  explicit Profiles(std::string own) : own_(std::move(own)) {}
   template <class Read>
   void fill(const std::string& name, Read read) const;
 
-  // The endings of the profile names in the process.
-  std::string builtin_;
-  std::string own_;
+  std::string own_;  // the ending of the names of the file's profiles; empty: no file
 };
 
 }  // namespace tfdude::fastdds

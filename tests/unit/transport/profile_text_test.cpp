@@ -60,4 +60,19 @@ TEST_CASE("profile text: text that is not XML or has no profiles is rejected") {
   }
 }
 
+TEST_CASE("profile text: one profile alone, with the transports if it is that of a participant") {
+  const std::string xml = std::string("<profiles>") + kDescribed + participant("wire") +
+                          "<data_writer profile_name=\"two\"/><data_reader profile_name=\"three\"/>"
+                          "</profiles>";
+  const std::string one = only_profile(xml, "one");
+  CHECK(has(one, "participant profile_name=\"one\""));
+  CHECK(has(one, "transport_descriptor"));
+  CHECK_FALSE(has(one, "two"));
+  const std::string two = only_profile(xml, "two");
+  CHECK(has(two, "data_writer profile_name=\"two\""));
+  CHECK_FALSE(has(two, "transport_descriptor"));
+  CHECK_FALSE(has(two, "one"));
+  CHECK_FALSE(has(two, "three"));
+}
+
 }  // namespace tfdude::fastdds
