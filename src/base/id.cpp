@@ -29,15 +29,17 @@ CodePoint decode(std::string_view text) {
   return {value, bytes};
 }
 
+bool is_plain(std::string_view text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+}
+
 bool is_control(std::uint32_t value) { return value < 0x20 || (value >= 0x7F && value < 0xA0); }
 
 }  // namespace
 
 Result<void> check_id(std::string_view id, std::string_view what) {
   // The common case, which is fast: this runs for each edge of a stream.
-  const auto plain = [](char c) { return c >= ' ' && c <= '~'; };
-  if (!id.empty() && id.size() <= kMaxIdBytes && std::all_of(id.begin(), id.end(), plain))
-    return {};
+  if (!id.empty() && id.size() <= kMaxIdBytes && is_plain(id)) return {};
   const std::string field(what);
   if (id.empty()) return fail(Errc::kInvalidInput, field + " is empty");
   if (id.size() > kMaxIdBytes) {
@@ -68,6 +70,7 @@ Result<void> check_partition_name(std::string_view name) {
 }
 
 std::string printable(std::string_view text) {
+  if (is_plain(text)) return std::string(text);  // errors about frames are part of usual lookups
   constexpr std::string_view kHexDigits = "0123456789abcdef";
   std::string out;
   for (std::size_t i = 0; i < text.size();) {

@@ -251,6 +251,7 @@ Result<LookupPlan> route_lookup(const Forest& forest, const Directory& directory
   auto segments = forest.segments(a, b);
   if (!segments) return tl::unexpected(segments.error());
   LookupPlan plan{*std::move(segments), {}, query.at && *query.at < Time{}};
+  plan.parts.reserve(plan.segments.size());
   for (const Segment& segment : plan.segments) {
     auto& body =
         body_for<LookupRequest>(plan.parts, directory, segment.owner, owned_end(forest, segment));

@@ -255,6 +255,10 @@ std::vector<PushedValues> pieces_of(PushedValues&& pushed) {
   const std::size_t most = correlated_entries(pushed) > kMaxCorrelated ? kMaxCorrelated : kMaxItems;
   const std::size_t count = std::max<std::size_t>((pushed.entries.size() + most - 1) / most, 1);
   std::vector<PushedValues> pieces;
+  if (count == 1) {
+    pieces.push_back(std::move(pushed));
+    return pieces;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     const auto begin = pushed.entries.begin() + static_cast<std::ptrdiff_t>(i * most);
     const auto length = std::min(most, pushed.entries.size() - i * most);

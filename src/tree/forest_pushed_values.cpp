@@ -72,6 +72,13 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
   return first;
 }
 
+// Usually there is nothing to sort, and a stable sort allocates.
+void sort_by_stamp(std::vector<PushedValue>::iterator begin,
+                   std::vector<PushedValue>::iterator end) {
+  const auto earlier = [](const PushedValue& a, const PushedValue& b) { return a.stamp < b.stamp; };
+  if (!std::is_sorted(begin, end, earlier)) std::stable_sort(begin, end, earlier);
+}
+
 // Adds values of one edge. Between positions of a joint that are far apart, it adds values, since
 // the watcher only has the poses.
 class Telling {
@@ -145,8 +152,7 @@ void Telling::tell_cleared(std::uint64_t seen) {
 void Telling::finish(bool begins) {
   if (values_.size() == begin_) return;
   const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
-  std::stable_sort(begin, values_.end(),
-                   [](const PushedValue& a, const PushedValue& b) { return a.stamp < b.stamp; });
+  sort_by_stamp(begin, values_.end());
   values_.back().correlation = correlation_of(edge_);
   if (!begins) return;
   begin->process_noise =
@@ -196,10 +202,10 @@ PushedCommit Forest::values_since(std::vector<EdgeCursor>& cursors,
     if (edge == nullptr) continue;
     EdgeCursor& cursor = cursors[index];
     cursor.frame = {edge->slot, edge->generation};
+    if (edge->commit > cursor.commit && all.values.empty()) all.values.reserve(cursors.size());
     add_values(*edge, index, query, commit, cursor, all.values);
   }
-  std::stable_sort(all.values.begin(), all.values.end(),
-                   [](const PushedValue& a, const PushedValue& b) { return a.stamp < b.stamp; });
+  sort_by_stamp(all.values.begin(), all.values.end());
   return all;
 }
 

@@ -189,7 +189,8 @@ Result<void> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take
   const Version* b = ends.b;
   PathAccumulation<Value> path_a = begin_path<Value>(order);
   PathAccumulation<Value> path_b = begin_path<Value>(order);
-  // The first error. From there on only errors matter, and kNotConnected has priority.
+  // From the first error on only errors matter. kNotConnected has priority over kNotOwner, and that
+  // over others.
   std::optional<Error> error;
   while (a != b) {
     const bool from_a = a->depth >= b->depth;
@@ -197,8 +198,11 @@ Result<void> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take
     const bool top = absent == Absent::kEnds ? here->depth == 0 : here->above == nullptr;
     if (top) return not_connected(*ends.a, *ends.b);
     if (!here->held()) {
-      error = Error{Errc::kNotOwner,
-                    "the edge of " + quote(here->name->text) + " is owned by another partition"};
+      // A path to others may have many such edges.
+      if (!error || error->code != Errc::kNotOwner) {
+        error = Error{Errc::kNotOwner,
+                      "the edge of " + quote(here->name->text) + " is owned by another partition"};
+      }
     } else if (!error) {
       const auto& edge = static_cast<const HeldVersion&>(*here);
       PathAccumulation<Value>& path = from_a ? path_a : path_b;

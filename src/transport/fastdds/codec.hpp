@@ -33,6 +33,8 @@ void write_wire(const Request& request, std::string_view partition, wire::Reques
 /// Likewise, without allocating where the sample has held as many edges or joints of names as long.
 void write_wire(const Update& update, wire::Update& sample);
 void write_wire(const JointUpdate& update, wire::Joints& sample);
+void write_wire(const Reply& reply, wire::Reply& sample);
+void write_wire(const PushedValues& pushed, wire::State& sample);
 [[nodiscard]] wire::Request to_wire(const Request& request, std::string_view partition);
 [[nodiscard]] wire::Reply to_wire(const Reply& reply);
 [[nodiscard]] wire::Update to_wire(const Update& update);

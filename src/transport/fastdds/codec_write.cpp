@@ -338,17 +338,28 @@ struct ReplyWriter {
 
 }  // namespace
 
-wire::Reply to_wire(const Reply& reply) {
-  wire::Reply sample;
+void write_wire(const Reply& reply, wire::Reply& sample) {
   sample.epoch(reply.epoch);
   sample.lamport_time(reply.lamport_time);
   sample.sequence_number(reply.sequence);
   std::visit(ReplyWriter{sample.body()}, reply.body);
+}
+
+wire::Reply to_wire(const Reply& reply) {
+  wire::Reply sample;
+  write_wire(reply, sample);
   return sample;
 }
 
 wire::State to_wire(const PushedValues& pushed) {
   wire::State sample;
+  write_wire(pushed, sample);
+  return sample;
+}
+
+void write_wire(const PushedValues& pushed, wire::State& sample) {
+  sample.beginnings().clear();
+  sample.correlations().clear();
   sample.group(pushed.group);
   sample.after(pushed.after);
   sample.commit(pushed.commit);
@@ -380,7 +391,6 @@ wire::State to_wire(const PushedValues& pushed) {
     sample.correlations().back().entry(static_cast<std::uint32_t>(i));
     sample.correlations().back().edge_correlation(wire_correlation(correlation));
   }
-  return sample;
 }
 
 }  // namespace tfdude::fastdds

@@ -18,7 +18,7 @@ void FastDdsTransport::take_request(const wire::Request& sample, const ertps::Gu
   if (sample.body()._d() == kProbe) {
     wire::Reply alive;
     alive.body().alive(0);
-    reply(peer, std::move(alive));
+    reply(peer, alive);
     return;
   }
   auto request = from_wire(sample);

@@ -289,15 +289,17 @@ void FastDdsTransport::open_reply_writer(const PeerId& peer) {
 }
 
 void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
-  this->reply(to, to_wire(reply));
+  thread_local wire::Reply sample;  // kept, for its memory
+  write_wire(reply, sample);
+  this->reply(to, sample);
 }
 
-void FastDdsTransport::reply(const PeerId& to, wire::Reply sample) {
+void FastDdsTransport::reply(const PeerId& to, wire::Reply& sample) {
   if (const auto writer = reply_writers_.find(to)) {
     if (writer->good()) writer->write(&sample);
     return;
   }
-  worker_->post([this, to, late = std::move(sample)]() mutable {
+  worker_->post([this, to, late = sample]() mutable {
     open_reply_writer(to);
     const auto writer = reply_writers_.find(to);
     if (writer != nullptr && writer->good()) writer->write(&late);

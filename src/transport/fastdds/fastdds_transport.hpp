@@ -106,7 +106,7 @@ class FastDdsTransport final : public Transport {
     return {*participant_, *profiles_, *gate_, *counters_, announced_};
   }
   void open_reply_writer(const PeerId& peer);
-  void reply(const PeerId& to, wire::Reply sample);
+  void reply(const PeerId& to, wire::Reply& sample);
 
   /// A reader's callback that accounts the time it takes to the sender.
   template <class Take>

@@ -56,7 +56,8 @@ void PushChannels::push(const PushedValues& pushed) {
     writer = entry;
   }
   if (!writer->good()) return;
-  wire::State sample = to_wire(pushed);
+  thread_local wire::State sample;  // kept, for its memory
+  write_wire(pushed, sample);
   writer->write(&sample);
 }
 
