@@ -277,7 +277,7 @@ def first_answer(stage: Stage, quick: bool) -> Iterator[dict]:
         for _ in range(runs):
             for who, command in commands.items():
                 begin = time.monotonic()
-                subprocess.run(command, stdout=subprocess.DEVNULL, check=True, timeout=processes.PATIENCE_S)
+                subprocess.run(command, stdout=subprocess.DEVNULL, check=True)  # with a timeout it polls
                 times[who].append((time.monotonic() - begin) * 1000)
                 time.sleep(LEFT_S)
     for who, values in times.items():

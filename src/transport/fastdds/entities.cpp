@@ -109,6 +109,8 @@ void Writer::on_publication_matched(edds::DataWriter*,
   {
     const Lock lock(mutex_);
     one_more = status.current_count > readers_;
+    if (readers_ == 0) matched_at_ = Deadline::clock::now();
+    if (status.current_count == 0) replies_arrive_ = false;
     readers_ = status.current_count;
   }
   matched_.notify_all();

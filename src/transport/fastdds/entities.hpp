@@ -74,6 +74,15 @@ class Writer final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample);
 
+  /// Since when a reader has been discovered, without a pause; only while matched().
+  [[nodiscard]] Deadline matched_at() const { return matched_at_.load(std::memory_order_relaxed); }
+
+  /// Records that what the readers send back reaches this participant, until they have left.
+  void hear_replies() { replies_arrive_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] bool replies_arrive() const {
+    return replies_arrive_.load(std::memory_order_relaxed);
+  }
+
   /// For a reliable writer: waits until everything written is acknowledged. False at the deadline,
   /// or if no reader is left that could acknowledge.
   [[nodiscard]] bool flush(Deadline deadline);
@@ -103,6 +112,8 @@ class Writer final : public edds::DataWriterListener {
   std::atomic<std::uint64_t> written_{0};       // number of samples, counted once written
   std::atomic<std::uint64_t> acknowledged_{0};  // at least so many of them
   std::atomic<Deadline> last_use_{Deadline::min()};
+  std::atomic<Deadline> matched_at_{Deadline::min()};
+  std::atomic<bool> replies_arrive_{false};
   std::recursive_mutex writing_;  // as Fast DDS's own
   GrowingStamp source_stamp_;     // under writing_
 };

@@ -59,7 +59,8 @@ void FastDdsTransport::take_reply(const wire::Reply& sample, const edds::SampleI
   const ertps::GUID_t& writer = writer_of(info);
   peers_.replied(writer.guidPrefix);
   if (sample.body()._d() == kAlive) return;  // that it arrives says all
-  const std::string owner = owner_of_replies(writer_partitions_.of(writer));
+  std::string owner = reply_paths_.owner(writer);
+  if (owner.empty()) owner = owner_of_replies(writer_partitions_.of(writer));
   auto reply = from_wire(sample);
   if (reply) {
     reply->sent = Time(std::chrono::nanoseconds(info.source_timestamp.to_ns()));

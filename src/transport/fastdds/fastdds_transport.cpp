@@ -118,8 +118,8 @@ void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
 
 Result<void> FastDdsTransport::create_endpoints() {
   using Info = edds::SampleInfo;
-  senders_.emplace(
-      Senders::Parts{context(), topics_, peers_, attention_, access_, options_.domain});
+  senders_.emplace(Senders::Parts{context(), topics_, peers_, attention_, access_, reply_paths_,
+                                  options_.domain});
   contact_.emplace(peers_, attention_, *senders_, !announced_by_dds_);
   push_channels_.emplace(
       context(), *topics_.state, options_.partition,
@@ -146,7 +146,10 @@ Result<void> FastDdsTransport::create_endpoints() {
       context(), *topics_.reply, reply_partition(kAllOwners, self_), "call_reader",
       Reader<wire::Reply>::Calls{
           [this](const wire::Reply& sample, const Info& info) { take_reply(sample, info); },
-          nullptr});
+          [this](const ertps::GUID_t& writer, int change) {
+            if (change <= 0) return reply_paths_.closed(writer);
+            reply_paths_.opened(writer, owner_of_replies(writer_partitions_.of(writer)));
+          }});
   if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
       !clock_->good()) {
     return not_created("the readers");

@@ -21,6 +21,7 @@
 #include "transport/fastdds/owned_filter.hpp"
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/push_channels.hpp"
+#include "transport/fastdds/reply_paths.hpp"
 #include "transport/fastdds/senders.hpp"
 #include "transport/fastdds/topics.hpp"
 #include "transport/fastdds/worker.hpp"
@@ -149,6 +150,7 @@ class FastDdsTransport final : public Transport {
   Access access_;
   Admission admission_{[this](const PeerId& peer, const Announcement& said) { admit(peer, said); }};
   WriterPartitions writer_partitions_;
+  ReplyPaths reply_paths_;
   FairShare fair_share_;
   Attention attention_;
   Announced announced_;

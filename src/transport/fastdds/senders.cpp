@@ -16,6 +16,9 @@ namespace {
 // How often a call that waits for an owner checks whether it still can come.
 constexpr std::chrono::milliseconds kWaitStep{60};
 
+// An owner whose writer for replies is not discovered for so long after its reader is asked anyway.
+constexpr std::chrono::milliseconds kReplyPathWithin{20};
+
 }  // namespace
 
 WriterTable<std::string> Senders::writers_of(edds::Topic* topic, const char* profile) const {
@@ -33,6 +36,13 @@ Result<void> Senders::send(const std::string& partition, const Request& request,
                            Deadline deadline) {
   if (auto ok = parts_.access.check(partition, request); !ok) return ok;
   const auto to = (is_change(request) ? changes_ : requests_).open(partition);
+  if (!to->replies_arrive()) {
+    if (auto ok = await_match(*to, partition, deadline); !ok) return ok;
+    if (!await_reply_path(*to, partition, deadline)) {
+      return tl::unexpected(undiscovered(partition));
+    }
+    to->hear_replies();
+  }
   thread_local wire::Request sample;
   write_wire(request, partition, sample);
   return send(*to, partition, &sample, deadline);
@@ -57,8 +67,24 @@ Error Senders::undiscovered(const std::string& partition) const {
                               std::to_string(parts_.domain)};
 }
 
+// A request whose reply would be dropped would have to be repeated.
+// @return false at the deadline
+bool Senders::await_reply_path(Writer& writer, const std::string& partition, Deadline deadline) {
+  const auto latest = writer.matched_at() + kReplyPathWithin;
+  return parts_.reply_paths.wait_until(partition, std::min(deadline, latest)) ||
+         Peers::Clock::now() >= latest;
+}
+
 Result<void> Senders::send(Writer& writer, const std::string& partition, void* sample,
                            Deadline deadline) {
+  if (auto ok = await_match(writer, partition, deadline); !ok) return ok;
+  if (!writer.write(sample)) {
+    return fail(Errc::kTimeout, "partition " + quote(partition) + " cannot be sent more data now");
+  }
+  return {};
+}
+
+Result<void> Senders::await_match(Writer& writer, const std::string& partition, Deadline deadline) {
   if (!writer.good()) return fail(Errc::kTransport, "Fast DDS could not create a writer");
   parts_.attention.pay(writer);
   while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + kWaitStep))) {
@@ -70,9 +96,6 @@ Result<void> Senders::send(Writer& writer, const std::string& partition, void* s
       return fail(Errc::kConfig, "partition " + quote(partition) + ": " + mismatch);
     }
     if (Peers::Clock::now() >= deadline) return tl::unexpected(undiscovered(partition));
-  }
-  if (!writer.write(sample)) {
-    return fail(Errc::kTimeout, "partition " + quote(partition) + " cannot be sent more data now");
   }
   return {};
 }

@@ -11,6 +11,7 @@
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/reply_paths.hpp"
 #include "transport/fastdds/topics.hpp"
 #include "transport/fastdds/writer_table.hpp"
 #include "transport/port.hpp"
@@ -29,6 +30,7 @@ class Senders {
     Peers& peers;
     Attention& attention;
     const Access& access;
+    const ReplyPaths& reply_paths;
     std::uint32_t domain;  // for messages
   };
 
@@ -60,6 +62,10 @@ class Senders {
   [[nodiscard]] WriterTable<std::string> writers_of(edds::Topic* topic, const char* profile) const;
   [[nodiscard]] Result<void> send(Writer& writer, const std::string& partition, void* sample,
                                   Deadline deadline);
+  [[nodiscard]] Result<void> await_match(Writer& writer, const std::string& partition,
+                                         Deadline deadline);
+  [[nodiscard]] bool await_reply_path(Writer& writer, const std::string& partition,
+                                      Deadline deadline);
   [[nodiscard]] Error undiscovered(const std::string& partition) const;
   template <class Message, class Sample>
   std::unique_ptr<Channel<Message>> channel(WriterTable<std::string>& writers,
