@@ -29,25 +29,30 @@ void Pages::changed(std::uint32_t number, const std::string& id) {
 
 void Pages::put(const std::string& id, const std::string& parent, std::uint64_t lamport_time) {
   forget_tombstone(id);
-  const auto known = page_of_.find(id);
-  const std::uint32_t number = known != page_of_.end() ? known->second : page_with_room();
-  if (known == page_of_.end()) page_of_.emplace(id, number);
-  pages_[number].frames[id] = {parent, lamport_time};
-  changed(number, id);
+  const auto [known, is_new] = frames_.try_emplace(id);
+  Frame& frame = known->second;
+  frame.place = {parent, lamport_time};
+  if (is_new) {
+    frame.page = page_with_room();
+    pages_[frame.page].frames.push_back(&*known);
+  }
+  changed(frame.page, id);
 }
 
 void Pages::erase(const std::string& id) {
-  const auto known = page_of_.find(id);
-  if (known == page_of_.end()) return;
-  const std::uint32_t number = known->second;
-  page_of_.erase(known);
-  pages_[number].frames.erase(id);
+  const auto known = frames_.find(id);
+  if (known == frames_.end()) return;
+  const std::uint32_t number = known->second.page;
+  auto& frames = pages_[number].frames;
+  std::swap(*std::find(frames.begin(), frames.end(), &*known), frames.back());
+  frames.pop_back();
   changed(number, id);
+  frames_.erase(known);
 }
 
 void Pages::put_joint(const std::string& id, const PageJoint& joint) {
   joints_[id] = joint;
-  changed(page_of_.at(id), id);
+  changed(frames_.at(id).page, id);
 }
 
 std::optional<PageJoint> Pages::erase_joint(const std::string& id) {
@@ -55,7 +60,7 @@ std::optional<PageJoint> Pages::erase_joint(const std::string& id) {
   if (there == joints_.end()) return std::nullopt;
   PageJoint joint = std::move(there->second);
   joints_.erase(there);
-  changed(page_of_.at(id), id);
+  changed(frames_.at(id).page, id);
   return joint;
 }
 
@@ -85,9 +90,9 @@ void Pages::forget_tombstone(const std::string& id) {
 }
 
 std::optional<Pages::Place> Pages::place(const std::string& id) const {
-  const auto known = page_of_.find(id);
-  if (known == page_of_.end()) return std::nullopt;
-  return pages_[known->second].frames.at(id);
+  const auto known = frames_.find(id);
+  if (known == frames_.end()) return std::nullopt;
+  return known->second.place;
 }
 
 std::optional<Tombstone> Pages::tombstone(const std::string& id) const {
@@ -137,8 +142,9 @@ std::vector<Page> Pages::take_changed() {
     Page page{partition_, number, incarnation_, epoch_, {}, {}, {}, {}};
     const Sheet& sheet = pages_[number];
     page.entries.reserve(sheet.frames.size());
-    for (const auto& [id, place] : sheet.frames) {
-      page.entries.push_back({id, place.parent, place.lamport_time});
+    for (const Frames::value_type* frame : sheet.frames) {
+      const auto& [id, there] = *frame;
+      page.entries.push_back({id, there.place.parent, there.place.lamport_time});
       if (const auto joint = joints_.find(id); joint != joints_.end()) {
         page.joints.push_back(joint->second);
       }

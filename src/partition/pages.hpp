@@ -87,16 +87,20 @@ class Pages {
   void watch_ids() { watching_ = true; }
   [[nodiscard]] bool is_touched(const std::string& id) const { return touched_.count(id) != 0; }
 
-  [[nodiscard]] std::size_t frame_count() const { return page_of_.size(); }
+  [[nodiscard]] std::size_t frame_count() const { return frames_.size(); }
   [[nodiscard]] std::uint32_t count() const { return static_cast<std::uint32_t>(pages_.size()); }
 
  private:
+  struct Frame {
+    Place place;
+    std::uint32_t page = 0;
+  };
+  using Frames = std::unordered_map<std::string, Frame>;
   struct Sheet {
-    std::map<std::string, Place> frames;
+    std::vector<const Frames::value_type*> frames;
     std::map<std::string, Tombstone> tombstones;
     [[nodiscard]] std::size_t size() const { return frames.size() + tombstones.size(); }
   };
-  using PageOf = std::unordered_map<std::string, std::uint32_t>;
 
   std::uint32_t page_with_room();
   void changed(std::uint32_t number, const std::string& id);
@@ -108,8 +112,8 @@ class Pages {
   std::uint64_t incarnation_;
   std::uint64_t epoch_;
   std::vector<Sheet> pages_;
-  PageOf page_of_;
-  PageOf page_of_tombstone_;
+  Frames frames_;
+  std::unordered_map<std::string, std::uint32_t> page_of_tombstone_;
   std::map<std::string, PageJoint> joints_;  // by frame
   // In order of creation; entries may be outdated.
   std::deque<std::pair<std::string, std::uint64_t>> oldest_tombstones_;

@@ -44,7 +44,7 @@ void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& 
   HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   forget_history(fresh);
   append_to(fresh, value, stamp);
-  newest.name->refused.behind = {};
+  newest.name->refused.end_row();
   if (restart_listener_) restart_listener_(restart);
 }
 
@@ -63,7 +63,7 @@ Sample Forest::Impl::sample_at(const SampleHistory& samples, std::uint64_t place
 // The newest sample stays unchanged, in a version that refers to the history with the new sample.
 void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
-  newest.name->refused.behind = {};
+  newest.name->refused.end_row();
   const std::uint64_t place = newest.samples->place_of(stamp);
   const Sample* there = newest.samples->sample(place);
   const Sample sample = sample_at(*newest.samples, place, value, stamp);
@@ -100,7 +100,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
 }
 
 void Forest::Impl::clear_history(const HeldVersion& edge) {
-  edge.name->refused.behind = {};
+  edge.name->refused.end_row();
   HeldVersion& fresh = push_held(edge.slot, edge.X_PC);
   forget_history(fresh);
   if (fresh.samples == nullptr) fresh.samples = new SampleHistory(default_timing_);

@@ -10,10 +10,11 @@ namespace {
 HistoryInfo history_of(const HeldVersion& edge) {
   HistoryInfo info;
   info.id = edge.name->text;
-  const Refused& refused = edge.name->refused;
-  info.refused_old = refused.old.load(std::memory_order_relaxed);
-  info.refused_equal = refused.equal.load(std::memory_order_relaxed);
-  info.refused_ahead = refused.ahead.load(std::memory_order_relaxed);
+  if (const Refused* refused = edge.name->refused.counts()) {
+    info.refused_old = refused->old.load(std::memory_order_relaxed);
+    info.refused_equal = refused->equal.load(std::memory_order_relaxed);
+    info.refused_ahead = refused->ahead.load(std::memory_order_relaxed);
+  }
   if (edge.samples == nullptr) return info;
   const SampleHistory& samples = *edge.samples;
   info.span_limit = samples.timing().span;
@@ -216,8 +217,9 @@ std::vector<HistoryInfo> Forest::histories(std::string_view id) const {
   const auto add = [&all](const Version* version) {
     if (version == nullptr || !version->held()) return;
     const auto& edge = static_cast<const HeldVersion&>(*version);
-    const bool refused = edge.name->refused.ahead.load(std::memory_order_relaxed) > 0;
-    if (edge.samples != nullptr || refused) all.push_back(history_of(edge));
+    const Refused* refused = edge.name->refused.counts();
+    const bool ahead = refused != nullptr && refused->ahead.load(std::memory_order_relaxed) > 0;
+    if (edge.samples != nullptr || ahead) all.push_back(history_of(edge));
   };
   if (!id.empty()) {
     add(impl_->frames_.present(id, commit));

@@ -76,7 +76,7 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
   if (!now) return no_time(edge);
   const std::int64_t ahead = saturating_subtract(stamp, *now);
   if (ahead <= limit) return {};
-  edge.name->refused.ahead.fetch_add(1, std::memory_order_relaxed);
+  edge.name->refused.more().ahead.fetch_add(1, std::memory_order_relaxed);
   return fail(Errc::kInvalidInput,
               "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
                   ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +

@@ -9,7 +9,9 @@ namespace {
 // Replaces an erased name, so that probing continues past it.
 const Name kTombstone;
 
-std::size_t hash_of(std::string_view id) { return std::hash<std::string_view>{}(id); }
+std::uint32_t hash_of(std::string_view id) {
+  return static_cast<std::uint32_t>(std::hash<std::string_view>{}(id));
+}
 
 }  // namespace
 
@@ -25,7 +27,7 @@ IdTable::~IdTable() {
 }
 
 const Name* IdTable::find(std::string_view id) const {
-  const std::size_t hash = hash_of(id);
+  const std::uint32_t hash = hash_of(id);
   const Table& table = *table_.load(std::memory_order_acquire);
   for (std::size_t i = hash & table.mask;; i = (i + 1) & table.mask) {
     const Name* name = table.cells[i].load(std::memory_order_acquire);
@@ -40,7 +42,7 @@ const Name* IdTable::insert(std::string_view id, std::uint32_t slot) {
     grow();
     table = table_.load(std::memory_order_relaxed);
   }
-  const auto* name = new Name{std::string(id), hash_of(id), slot, {}, {}};
+  const auto* name = new Name(id, hash_of(id), slot);
   if (place(*table, name)) ++used_;
   ++names_;
   return name;
@@ -75,7 +77,7 @@ void IdTable::collect(std::uint64_t tag, std::uint64_t safe_below) {
 void IdTable::grow() {
   // Sized by the live names, so that a table full of tombstones is cleaned rather than doubled.
   std::size_t capacity = 64;
-  while (capacity < (names_ + 1) * 3) capacity *= 2;
+  while (capacity < (names_ + 1) * 2) capacity *= 2;
   auto fresh = std::make_unique<Table>(capacity);
   Table* old = table_.load(std::memory_order_relaxed);
   for (auto& cell : old->cells) {

@@ -24,15 +24,49 @@ struct Refused {
   } behind;
 };
 
+/// The counts of an edge. They are allocated with its first refused sample, as most have none.
+class RefusedSamples {
+ public:
+  RefusedSamples() = default;
+  ~RefusedSamples() { delete counts_.load(std::memory_order_relaxed); }
+  RefusedSamples(const RefusedSamples&) = delete;
+  RefusedSamples& operator=(const RefusedSamples&) = delete;
+
+  /// Null: none was refused.
+  [[nodiscard]] const Refused* counts() const { return counts_.load(std::memory_order_acquire); }
+
+  /// To count one; for writers only.
+  [[nodiscard]] Refused& more() {
+    Refused* counts = counts_.load(std::memory_order_relaxed);
+    if (counts == nullptr) {
+      counts = new Refused;
+      counts_.store(counts, std::memory_order_release);
+    }
+    return *counts;
+  }
+
+  /// The next sample that is too old is the first one in a row; for writers only.
+  void end_row() {
+    if (Refused* counts = counts_.load(std::memory_order_relaxed)) counts->behind = {};
+  }
+
+ private:
+  std::atomic<Refused*> counts_{nullptr};
+};
+
 /// An interned id and its slot. Immutable once in the table, except for `lamport_time` and
 /// `refused`.
 struct Name {
+  Name() = default;
+  Name(std::string_view id, std::uint32_t hashed, std::uint32_t number)
+      : text(id), hash(hashed), slot(number) {}
+
   std::string text;
-  std::size_t hash = 0;
+  std::uint32_t hash = 0;
   std::uint32_t slot = 0;
   /// When the frame got its parent. That of the newest commit, whichever a reader sees.
   mutable std::atomic<std::uint64_t> lamport_time{0};
-  mutable Refused refused;
+  mutable RefusedSamples refused;
 
   void hung(std::uint64_t when) const { lamport_time.store(when, std::memory_order_relaxed); }
 };

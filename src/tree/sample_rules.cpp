@@ -25,7 +25,7 @@ bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp
 // Whether the history restarts with this sample, which is older than the span; counts it.
 bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
   const std::size_t needed = newest.samples->timing().restart_after;
-  Refused::Behind& row = newest.name->refused.behind;
+  Refused::Behind& row = newest.name->refused.more().behind;
   if (!goes_on(row, newest.stamp, stamp)) {
     row = {1, newest.stamp, stamp};
   } else if (stamp > row.last) {
@@ -40,7 +40,7 @@ Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   const SampleHistory& samples = *newest.samples;
   const std::uint64_t place = samples.place_of(stamp);
   if (place < samples.next() && samples.stamp(place) == stamp) {
-    newest.name->refused.equal.fetch_add(1, std::memory_order_relaxed);
+    newest.name->refused.more().equal.fetch_add(1, std::memory_order_relaxed);
     return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
                                        " has a sample of that stamp, " + to_string(time_of(stamp)));
   }
@@ -48,7 +48,7 @@ Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   const std::int64_t limit = newest.stamp - samples.timing().span.count();
   if (stamp >= limit && (!full || place > samples.oldest())) return {};
   if (stamp < limit && starts_again(newest, stamp)) return {};
-  newest.name->refused.old.fetch_add(1, std::memory_order_relaxed);
+  newest.name->refused.more().old.fetch_add(1, std::memory_order_relaxed);
   const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
   if (stamp < limit) {
     return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
