@@ -30,22 +30,6 @@ MOST_IDLE_CORES = 1.6  # more means that they still discover each other
 NOT_THERE = 1  # exit status of tfdude
 
 
-@contextlib.contextmanager
-def running(commands):
-    """Starts programs one after the other; each says in a line that it is ready. Yields the processes."""
-    started = []
-    try:
-        for command in commands:
-            started.append(subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE,
-                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0))
-        for process in started:
-            processes.await_line(process.stdout, process.args[0])
-        yield started
-    finally:
-        for process in started:
-            processes.end(process)
-
-
 def settle(started):
     """Waits until they have discovered each other: traffic is constant, and the processors are not busy. Returns how
     long that took, or None if it did not end in time."""
@@ -112,13 +96,13 @@ def measure(bin_dir, daemons, clients, questions):
         program = [bin_dir / "bare_participant", domain, processes.PROFILE]
         bare = [[*program, "server", "asked"]]
         bare += [[*program, "owner"]] * (daemons - 1) + [[*program, "client"]] * clients
-        with running(bare) as started:
+        with processes.running(bare) as started:
             control = cost_of(started)
             control["new_participant_ms"] = milliseconds([*program, "asker", "asked"], questions,
                                                          control["packets_s"])
         files = scaling.configurations(pathlib.Path(folder), daemons, daemons)
         ours = [[bin_dir / "tfduded", "--no-state", "--config", file, *common] for file in files]
-        with running(ours) as owners:
+        with processes.running(ours) as owners:
             watch = [[bin_dir / "tfdude", *common, "events"]] * clients
             with contextlib.ExitStack() as all_of:
                 listeners = []

@@ -57,6 +57,22 @@ def await_line(stream, what):
 
 
 @contextlib.contextmanager
+def running(commands):
+    """Starts programs one after the other; each says in a line that it is ready. Yields the processes."""
+    started = []
+    try:
+        for command in commands:
+            started.append(subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE,
+                                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0))
+        for process in started:
+            await_line(process.stdout, process.args[0])
+        yield started
+    finally:
+        for process in started:
+            end(process)
+
+
+@contextlib.contextmanager
 def daemons(bin_dir, configs, domain, logs, options=("--profile", PROFILE)):
     """Runs a tfduded for each configuration file until the block is left."""
     running = []

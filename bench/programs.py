@@ -1,4 +1,4 @@
-"""The stages of separate programs: the core compared with tf2, readers concurrent with a writer, and many daemons."""
+"""The stages of separate programs: the core compared with tf2, readers concurrent with a writer, memory, many daemons."""
 
 import json
 import os
@@ -51,8 +51,20 @@ def contention(quick, bin_dir, _work):
     if not program.exists():
         raise processes.Skipped("contention_bench is not built")
     seconds, repetitions = ("0.3", "5") if quick else ("3", "7")
-    printed = processes.output_of([program, seconds, repetitions], SECONDS_FOR_A_STAGE)
-    for line in printed.splitlines():
+    yield from printed_figures([program, seconds, repetitions])
+
+
+def memory(_quick, bin_dir, _work):
+    """The heap that a frame takes."""
+    program = bin_dir / "memory_bench"
+    if not program.exists():
+        raise processes.Skipped("memory_bench is not built")
+    yield from printed_figures([program])
+
+
+def printed_figures(command):
+    """The figures that a program prints, one line of JSON each."""
+    for line in processes.output_of(command, SECONDS_FOR_A_STAGE).splitlines():
         if line.startswith("{"):
             yield json.loads(line)
 

@@ -237,6 +237,52 @@ WIRE_NAMES = {"add": "add", "remove": "remove", "lookup_other": "look up, one ot
               "publish_joint": "publish a joint's position"}
 
 
+WIRE_TABLE = """\
+### Who sends what, centralized and decentralized
+
+UDP bytes: request + reply + other, and all packets. Centralized: one daemon owns all frames, and a
+client asks. By the owner: the process that owns the frame. By another: a client, beside the owners.
+`2`: the thesis's example; `5` and `16`: partitions of two frames each.
+"""
+ONE_SHOT = """\
+### A program that asks once
+
+`tfdude lookup` beside two daemons, from its start until nothing of it is left: UDP bytes. Bare: a
+participant of Fast DDS with the same readers and writers that asks one of two others.
+"""
+
+
+def wire_table(figures):
+    """The whole of table 5.1: each operation in systems of several sizes."""
+    hows = (("centralized", "centralized"), ("by_owner", "by the owner"), ("by_other", "by another"))
+    rows = []
+    for system in ("2", "5", "16"):
+        for operation in ("add", "remove", "lookup", "update", "publish"):
+            cells = []
+            for how, _ in hows:
+                key = f"wire/table/{system}/{how}/{operation}"
+                parts = " + ".join(value(figures, f"{key}/{part}_udp", convert=as_measured)
+                                   for part in ("request", "reply", "other"))
+                cells.append(f"{parts}; {value(figures, f'{key}/packets', convert=as_measured)}")
+            rows.append((f"{system}: {operation}", *cells))
+        idle = [value(figures, f"wire/table/{system}/{where}/idle/udp_per_second", convert=as_measured)
+                for where in ("centralized", "decentralized")]
+        rows.append((f"{system}: discovery and presence, a second", idle[0], idle[1], idle[1]))
+    return table(("operation", *(title for _, title in hows)), rows)
+
+
+def one_shot_table(figures):
+    """The parts of the traffic of one question."""
+    rows = [(name, *(value(figures, f"wire/one_shot/{side}/{key}", convert=as_measured) for side in ("ours", "bare")))
+            for key, name in (("total_udp", "all"), ("packets", "packets"),
+                              ("participants_udp", "announcements of participants"),
+                              ("endpoints_udp", "announcements of readers and writers"),
+                              ("acknowledgements_udp", "heartbeats and acknowledgements"),
+                              ("presence_udp", "presence"), ("structure_udp", "structure"),
+                              ("question_udp", "requests and replies"))]
+    return table(("part", "ours", "bare"), rows)
+
+
 def wire_section(figures, _drawn, _home):
     """Table 5.1."""
     def size(name):
@@ -253,13 +299,19 @@ def wire_section(figures, _drawn, _home):
     paths = ", ".join(f"{size(f'lookup_over_{count}_partitions/total_udp')} over {count}"
                       for count in (1, 2, 4))
     return [WIRE, table(head, rows),
-            f"- This build of Fast DDS adds {size('update/vendor_rtps')} of an update's RTPS bytes, "
-            "in both directions together, for its statistics.\n"
+            "- More than the thesis counts: a request to remove names its sender's last change, so that "
+            "changes of one client keep their order, and all requests a number, below which no answer is "
+            "awaited any more. A lookup names both ends of its segment. The thesis's answers have one "
+            "byte; ours have the number of the request and the epoch of the structure that shows it.\n"
+            "- An added frame on a page of 60 frames or fewer: "
+            f"{size('full_page/add/other_udp')} bytes of changes and acknowledgements to two participants; "
+            f"removed: {size('full_page/remove/other_udp')}.\n"
             f"- UDP bytes of a lookup with six partitions in the domain, by the number of partitions on "
             f"its path: {paths}. The thesis's worst case is {thesis.WORST_CASE_PER_PROCESS} payload "
             "bytes for each existing process.\n"
             "- Discovery and presence of two daemons and a client that do nothing: "
-            f"{size('idle/udp_per_second')} UDP bytes a second.\n"]
+            f"{size('idle/udp_per_second')} UDP bytes a second.\n",
+            WIRE_TABLE, wire_table(figures), ONE_SHOT, one_shot_table(figures)]
 
 
 def floor_section(figures, drawn, home):

@@ -9,6 +9,7 @@ import struct
 
 ACKNACK, HEARTBEAT, GAP, INFO_DST, DATA, DATA_FRAG = 0x06, 0x07, 0x08, 0x0E, 0x15, 0x16
 VENDORS_OWN = 0x80  # and above
+SPDP_WRITERS = (0x000100C2, 0xFF0101C2)  # announce participants; the second one with keys
 SEDP_WRITERS = (0x000003C2, 0x000004C2)  # announce endpoints that publish, and that subscribe
 PID_TOPIC_NAME, PID_ENDPOINT_GUID, PID_SENTINEL = 0x0005, 0x005A, 0x0001
 INLINE_QOS = 0x02  # a flag of DATA
@@ -36,6 +37,10 @@ class Packet:
     def udp_bytes(self):
         """Its size with IP and UDP headers."""
         return self.rtps_bytes + UDP_HEADERS
+
+    def is_about(self, entities):
+        """Whether its data, or what it says of data, is of one of these writers."""
+        return any(entity in entities for _, entity in self.writers)
 
 
 def _datagrams(path):

@@ -14,6 +14,7 @@ import history
 import machine
 import narrow
 import net_stage
+import one_shot
 import plots
 import processes
 import programs
@@ -23,16 +24,26 @@ import secured
 import tables
 import targets
 import wire
+import wire_table
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-QUICK_STAGES = ("core", "contention", "net", "wire", "pushed", "narrow")
+QUICK_STAGES = ("core", "contention", "memory", "net", "wire", "pushed", "narrow")
 STAGES = (*QUICK_STAGES, "many", "secured", "around")
+
+
+def on_the_wire(quick, bin_dir, work):
+    """All that is captured."""
+    yield from wire.run(quick, bin_dir, work)
+    yield from wire_table.run(bin_dir, work)
+    yield from one_shot.run(quick, bin_dir, work)
 
 
 def stage(name):
     """The function of a stage: it yields figures, given quick, the binaries' folder and a working folder."""
-    modules = {"net": net_stage, "wire": wire, "pushed": pushed, "narrow": narrow, "secured": secured}
+    if name == "wire":
+        return on_the_wire
+    modules = {"net": net_stage, "pushed": pushed, "narrow": narrow, "secured": secured}
     if name in modules:
         return modules[name].run
     return getattr(programs, name)

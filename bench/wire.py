@@ -4,6 +4,7 @@ Keys: wire/OPERATION/PART_LAYER [bytes], wire/OPERATION/packets, and wire/OPERAT
 adds to messages for its statistics, if it was built with them (Debian's is). PART is request, reply, or other. Other
 means changes of the structure after a frame was added or removed, and DDS's acknowledgements. LAYER is payload (CDR
 with its header of four bytes), rtps (the message) or udp (with IP and UDP headers).
+wire/full_page/OPERATION has the same of a partition of 60 frames.
 wire/lookup_over_N_partitions/total_udp is the whole traffic of a lookup with six partitions in the domain;
 wire/idle/udp_per_second is that of discovery and presence while two daemons and a client do nothing.
 """
@@ -22,6 +23,7 @@ PAUSE_S = 0.2  # after an operation: time for several of DDS's heartbeats and ac
 FLUSH_S = 1.5  # the kernel passes packets to a capture in blocks, up to a second late
 IDLE_S = 2.0
 PARTITIONS = 6
+FULL_PAGE = 60  # frames, with the one that is added
 PATHS = (1, 2, 4)  # partitions on the path
 THESIS_CONFIGS = ("robot", "arms")
 
@@ -38,12 +40,13 @@ OPERATIONS = {
 
 
 class WireClient:
-    """The client that performs operations one at a time (wire/wire_client.cpp)."""
+    """The client that performs operations one at a time (wire/wire_client.cpp); with a configuration, the owner of its
+    partition."""
 
-    def __init__(self, bin_dir, domain, log):
+    def __init__(self, bin_dir, domain, log, config=None):
         self._process = subprocess.Popen(
-            [bin_dir / "wire_client", str(domain), processes.PROFILE], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, stderr=log, bufsize=0)
+            [bin_dir / "wire_client", str(domain), processes.PROFILE, *([config] if config else [])],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, bufsize=0)
 
     def perform(self, operation):
         """Performs an operation. Returns the time of its start, in nanoseconds of the system clock."""
@@ -72,10 +75,10 @@ class WireClient:
 
 
 @contextlib.contextmanager
-def client_of(bin_dir, domain, work):
-    """Runs a client until the block is left."""
-    with open(work / "wire_client.log", "wb") as log:
-        client = WireClient(bin_dir, domain, log)
+def client_of(bin_dir, domain, work, config=None):
+    """Runs a client until the block is left, or the owner of the partition of a configuration."""
+    with open(work / ("wire_owner.log" if config else "wire_client.log"), "wb") as log:
+        client = WireClient(bin_dir, domain, log, config)
     try:
         yield client
     finally:
@@ -215,6 +218,30 @@ def measure_joint(bin_dir, work, rounds):
     yield from figures_of(rtps.Capture(file), "publish_joint", begins)
 
 
+def measure_full_page(bin_dir, work, rounds):
+    """An owner of 60 frames: what the structure's changes cost. Such a partition has the smallest pages."""
+    file = work / "full_page.pcap"
+    domain, _lease = processes.lease_domain()
+    config = work / "full_page.yaml"
+    config.write_text("partition: full_page\nframes:\n  - id: frame_base\n" + "".join(
+        f"  - id: frame_{number:04}\n    parent: frame_base\n" for number in range(1, FULL_PAGE - 1)),
+                      encoding="utf-8")
+    other = processes.ROOT / "examples" / "thesis" / "robot.yaml"
+    operations = {"add": "add tool_mount frame_0001", "remove": "remove tool_mount"}
+    begins = {name: [] for name in operations}
+    with capturing(file, domain), processes.daemons(bin_dir, [config, other], domain, work):
+        with client_of(bin_dir, domain, work) as client:
+            client.wait_until_met("lookup frame_base frame_0001")
+            for turn in range(rounds + 1):
+                for name, operation in operations.items():
+                    begin = client.perform(operation)
+                    if turn > 0:
+                        begins[name].append(begin)
+    capture = rtps.Capture(file)
+    for name, when in begins.items():
+        yield from figures_of(capture, f"full_page/{name}", when)
+
+
 def chain_configs(work):
     """The configurations of six daemons; the parent of each partition's first frame is in the partition before."""
     for number in range(1, PARTITIONS + 1):
@@ -255,3 +282,4 @@ def run(quick, bin_dir, work):
     yield from measure_operations(bin_dir, work, rounds)
     yield from measure_joint(bin_dir, work, rounds)
     yield from measure_chain(bin_dir, work, rounds)
+    yield from measure_full_page(bin_dir, work, rounds)

@@ -1,5 +1,5 @@
-// A DDS participant with the readers and writers of an owner or of a client, which sends nothing of
-// its own: what idling costs without tf-dude, and how long one question takes.
+// A DDS participant with the readers and writers of an owner without joints or of a client, which
+// sends nothing of its own: what idling costs without tf-dude, and how long one question takes.
 //
 //   bare_participant DOMAIN PROFILE owner|client    ends with the end of its standard input
 //   bare_participant DOMAIN PROFILE server NAME     an owner that answers in this DDS partition
@@ -49,7 +49,6 @@ class Bare {
     if (role == "asker") {
       for (const std::string& server : servers) {
         requests_.push_back(write<RequestType>(kRequestTopic, "call_writer", server));
-        write<RequestType>(kChangeTopic, "call_writer", server);
       }
       return;
     }
@@ -61,7 +60,6 @@ class Bare {
                                      [this](const edds::SampleInfo&) { answer(); });
     read<wire::Request, RequestType>(kChangeTopic, "call_reader", own);
     read<wire::Update, UpdateType>(kUpdateTopic, "update_reader");
-    read<wire::Joints, JointsType>(kJointTopic, "update_reader");
     write<PresenceType>(kPresenceTopic, "presence_writer");
     write<PageType>(kDirectoryTopic, "directory_writer");
   }

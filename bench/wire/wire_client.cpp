@@ -1,7 +1,9 @@
 // One long-lived client for bench/wire.py, which counts the traffic of each operation: discovery is
 // complete before the first one.
 //
-//   wire_client DOMAIN PROFILE
+//   wire_client DOMAIN PROFILE [CONFIG]
+//
+// With a configuration it is the owner of that partition.
 //
 // Reads operations from standard input, one per line:
 //   add ID PARENT | remove ID | update ID | publish ID | joint NAME | lookup A B
@@ -15,6 +17,8 @@
 #include <string>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+#include "tfdude/description/config.hpp"
 
 namespace {
 
@@ -31,7 +35,7 @@ Result<void> perform(Client& client, const std::string& line) {
   std::string first;
   std::string second;
   words >> operation >> first >> second;
-  const Transform X;
+  const Transform X = Transform::exact(Pose());  // with a covariance, as in the thesis
   if (operation == "add") return client.add(first, second, X);
   if (operation == "remove") return client.remove(first);
   if (operation == "update") return client.update(first, X);
@@ -44,17 +48,14 @@ Result<void> perform(Client& client, const std::string& line) {
   return fail(Errc::kInvalidInput, "unknown operation: " + line);
 }
 
-}  // namespace
+Result<Node> open_owner(const char* file, const Options& options) {
+  const auto config = load_config(file);
+  if (!config) return tl::unexpected(config.error());
+  return Node::open(config->partition, config->frames, options);
+}
 
-int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: wire_client DOMAIN PROFILE\n";
-    return 2;
-  }
-  Options options;
-  options.domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
-  options.profile = argv[2];
-  auto client = Client::open(options);
+template <class Opened>
+int run(Result<Opened> client) {
   if (!client) {
     std::cerr << client.error().message << '\n';
     return 1;
@@ -69,4 +70,17 @@ int main(int argc, char** argv) {
     }
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3 && argc != 4) {
+    std::cerr << "usage: wire_client DOMAIN PROFILE [CONFIG]\n";
+    return 2;
+  }
+  Options options;
+  options.domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
+  options.profile = argv[2];
+  return argc == 4 ? run(open_owner(argv[3], options)) : run(Client::open(options));
 }
