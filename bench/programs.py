@@ -1,4 +1,4 @@
-"""The stages of separate programs: the core compared with tf2, readers concurrent with a writer, memory, many daemons."""
+"""The stages of separate programs: the core compared with tf2, a reader beside a writer, memory, many daemons."""
 
 import json
 import os
