@@ -73,9 +73,12 @@ def slower(tell):
     """What is slower than what it is compared with."""
     return [
         _sentence("A lookup over 16 partitions takes {}, {} times as long as from one server, because each owner is a "
-                  "process of its own; on this machine two cores run all of them.",
+                  "process of its own and this machine has two cores. Bare Fast DDS to as many processes takes {}.",
                   tell.time("scale/partitions/16/decentralized"),
-                  tell.of("scale/partitions/16/decentralized", "scale/partitions/16/centralized")),
+                  tell.of("scale/partitions/16/decentralized", "scale/partitions/16/centralized"),
+                  tell.time("scale/partitions/16/dds_floor")),
+        _sentence("One `tfdude lookup`, from its start to its end, takes {} times a bare program that asks as many "
+                  "servers.", tell.of("first_answer/ours", "first_answer/dds")),
         _sentence("A value that is pushed to a watcher arrives after {}, {} times as late as a bare DDS sample.",
                   tell.time("pushed/latency/ours"), tell.of("pushed/latency/ours", "pushed/latency/dds")),
         _sentence("A frame of another process costs a round trip ({}) unless its path is watched. tf2 has a copy of "
