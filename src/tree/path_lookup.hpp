@@ -52,8 +52,8 @@ class PathLookup {
   }
 
  private:
-  // Results are computed where the caller will have them: a copy of what has just been written
-  // takes a tenth of a short lookup.
+  // Results are computed where the caller will have them: a copy would have to wait for what has
+  // just been written.
   template <class Value, class Compute>
   [[nodiscard]] static Result<Value> computed(Compute compute) {
     Result<Value> X_AB;
