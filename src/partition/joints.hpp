@@ -44,6 +44,8 @@ class Joints {
   [[nodiscard]] bool moves(std::string_view name) const {
     return by_name_.find(name) != by_name_.end();
   }
+  /// Whether there are joints. Constant once the partition serves; takes no lock.
+  [[nodiscard]] bool moves_any() const { return !by_name_.empty(); }
 
   /// Whether the frame's joint follows another one or is followed, and so shares its error.
   [[nodiscard]] bool is_coupled(std::string_view frame) const;

@@ -80,6 +80,8 @@ class Partition {
   void show(std::vector<JointInfo> joints) { joints_.show(std::move(joints)); }
   /// Whether this partition owns a joint of that name, or one that follows it. Takes no lock.
   [[nodiscard]] bool moves(std::string_view joint) const { return joints_.moves(joint); }
+  /// Whether it has joints. Constant once it serves.
+  [[nodiscard]] bool moves_any() const { return joints_.moves_any(); }
 
   /// Gives up these frames. Those below stay, and wait for other frames of these ids.
   /// @return kUnknownFrame, kNotOwner: then it gives up none

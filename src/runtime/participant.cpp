@@ -192,4 +192,9 @@ bool Participant::owns_joint(std::string_view name) const {
   return own != nullptr && own->moves(name);
 }
 
+bool Participant::owns_joints() const {
+  const Partition* own = member_.partition();
+  return own != nullptr && own->moves_any();
+}
+
 }  // namespace tfdude

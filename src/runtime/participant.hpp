@@ -105,6 +105,7 @@ class Participant final : public TransportHandler {
     return structure_.forest.holds(id);
   }
   [[nodiscard]] bool owns_joint(std::string_view name) const override;
+  [[nodiscard]] bool owns_joints() const override;
 
  private:
   [[nodiscard]] MemberRunner::Parts parts();

@@ -62,6 +62,8 @@ class TransportHandler {
   [[nodiscard]] virtual bool owns(std::string_view id) const = 0;
   /// The same for a joint.
   [[nodiscard]] virtual bool owns_joint(std::string_view name) const = 0;
+  /// Whether any joint is owned here. Constant while a partition is served.
+  [[nodiscard]] virtual bool owns_joints() const { return true; }
 };
 
 /// Sends to one partition for a thread that must not wait. Created once, used by one thread at a

@@ -36,7 +36,11 @@ struct Counted {
   Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
       : node(*Node::open(
             *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
-            partition, {{frame, "", {}}, {frame + "_tip", frame, {}}})) {}
+            partition,
+            {{frame, "", {}},
+             {frame + "_tip", frame, {}},
+             testing::moved_by(frame + "_wrist", frame,
+                               testing::revolute_named(frame + "_joint"))})) {}
 
   std::shared_ptr<FastDdsCounters> counters = std::make_shared<FastDdsCounters>();
   Node node;
@@ -321,7 +325,7 @@ TEST_CASE("malformed samples are counted and change nothing") {
   CHECK(other.node.lookup("a", "a_tip"));
   REQUIRE(other.node.update("a_tip", {}));
   CHECK_FALSE(moved(owner.node, "a"));
-  CHECK(other.node.frames()->size() == 4);
+  CHECK(other.node.frames()->size() == 6);
   CHECK(other.node.partitions()->size() == 2);
 }
 

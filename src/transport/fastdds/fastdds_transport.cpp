@@ -201,8 +201,7 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   requests_ = request_reader(topics_.request, partition, false);
   changes_ = request_reader(topics_.change, partition, true);
   auto* updates = create_filtered(topics_.update, partition);
-  auto* joints = create_filtered(topics_.joint, partition);
-  if (requests_ == nullptr || changes_ == nullptr || updates == nullptr || joints == nullptr) {
+  if (requests_ == nullptr || changes_ == nullptr || updates == nullptr) {
     return not_created("the readers of requests");
   }
   updates_ = std::make_unique<Reader<wire::Update>>(
@@ -210,12 +209,16 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
       Reader<wire::Update>::Calls{
           accounted([this](const wire::Update& sample, const Info&) { take_update(sample); }),
           nullptr});
+  if (!updates_->good()) return not_created("the readers");
+  if (!handler_->owns_joints()) return {};
+  auto* joints = create_filtered(topics_.joint, partition);
+  if (joints == nullptr) return not_created("the filter of joints");
   joints_ = std::make_unique<Reader<wire::Joints>>(
       context(), *joints, partition, "update_reader",
       Reader<wire::Joints>::Calls{
           accounted([this](const wire::Joints& sample, const Info&) { take_joints(sample); }),
           nullptr});
-  return updates_->good() && joints_->good() ? Result<void>() : not_created("the readers");
+  return joints_->good() ? Result<void>() : not_created("the reader of joints");
 }
 
 // A discovery server forwards several times per second, one step of the discovery at a time.
