@@ -197,8 +197,8 @@ WHY = {
         "question takes longer, so more announcements of participants fall into it.",
     "Across partitions: lookup over":
         "An owner does more for a request than a bare echo, as on the floor: 2 to 4 µs for each of two or four owners. "
-        "With 8 and 16 owners on two cores it is 8 and 16 µs, probably because each owner is woken with the caches that "
-        "the others have filled, and has more code and data to fetch than the echo.",
+        "With 8 and 16 owners on two cores it is 8 and 16 µs, probably because each owner is woken with the caches "
+        "that the others have filled, and has more code and data to fetch than the echo.",
     "Floor: ":
         "Planning, the codec, the filters and accounting take two to three microseconds of a round trip in both "
         "processes together. On one core they are not hidden by waiting. The kernel's three quarters of the bare round "
@@ -218,7 +218,7 @@ WHY = {
         "A command asks one owner for its frames before it knows whom to ask for their values, so it discovers the "
         "second owner's reader after the first answer. The bare client knows both from its start.",
     "Memory: a frame of 100,000 without history, at its owner":
-        "The version that readers see has the pose and the covariance, 328 bytes, whether they are given "
+        "The version that readers see has the pose and the covariance, 384 bytes, whether they are given "
         "or not; the pages, the names and the hierarchy take the rest.",
     "Memory: a frame of 100,000 without history, in a replica":
         "A version takes 56 bytes, a name with its cell in the table 85, a vertex of Boost.Graph with its "
