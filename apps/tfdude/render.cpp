@@ -145,22 +145,30 @@ std::string unspecified_text(const std::vector<std::string>& edges) {
 
 namespace {
 
+// Zero for what is printed as zero: rounding errors would otherwise make some of them -0.000000.
+double shown_as(double value, double last_digit) {
+  return std::abs(value) < last_digit / 2 ? 0.0 : value;
+}
+
 std::string describe_pose(const Pose& X_AB, const Shown& shown) {
   std::string text;
   if (shown.matrix) {
     const Eigen::Matrix4d matrix = X_AB.matrix();
     for (int row = 0; row < 4; ++row) {
       text += row == 0 ? "matrix     " : "           ";
-      for (int column = 0; column < 4; ++column) text += format(" % .9f", matrix(row, column));
+      for (int column = 0; column < 4; ++column) {
+        text += format(" % .9f", shown_as(matrix(row, column), 1e-9));
+      }
       text += "\n";
     }
     return text;
   }
-  const Eigen::Vector3d t = X_AB.translation();
-  const Eigen::Quaterniond q = X_AB.rotation();
-  const Eigen::Vector3d rpy = to_rpy(q);
+  const auto six_digits = [](double value) { return shown_as(value, 1e-6); };
+  const Eigen::Vector3d t = X_AB.translation().unaryExpr(six_digits);
+  const Eigen::Vector4d q = X_AB.rotation().coeffs().unaryExpr(six_digits);
+  const Eigen::Vector3d rpy = to_rpy(X_AB.rotation()).unaryExpr(six_digits);
   text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
-  text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q.x(), q.y(), q.z(), q.w());
+  text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q[0], q[1], q[2], q[3]);
   return text + "rpy          " + angles_text(rpy.x(), rpy.y(), rpy.z(), shown.angles) + "\n";
 }
 

@@ -231,7 +231,8 @@ inline Motion quotient(const Motion& X, const Columns& Y) {
 }
 
 // The quaternion and translation of X⁻¹. With the unit quaternion (v, w) of R, the largest row of
-// 4 (v, w)ᵀ (v, w) is normalized.
+// 4 (v, w)ᵀ (v, w) is normalized. Its sign is such that the largest number of the result is
+// positive, or w, if it is not much smaller.
 inline void store_inverse(const Motion& X, double* pose) {
   alignas(32) double R[3][4];
   alignas(32) double t[4];
@@ -244,7 +245,9 @@ inline void store_inverse(const Motion& X, double* pose) {
   const double xz = R[0][2] + R[2][0];
   const double yz = R[1][2] + R[2][1];
   double row[4] = {x, y, z, 1 + R[0][0] + R[1][1] + R[2][2]};
+  double sign = 1;
   if (row[3] < 1) {
+    sign = -1;
     const bool by_x = R[0][0] >= R[1][1] && R[0][0] >= R[2][2];
     const bool by_y = R[1][1] >= R[2][2];
     if (by_x) {
@@ -259,7 +262,7 @@ inline void store_inverse(const Motion& X, double* pose) {
     }
   }
   const double k =
-      1.0 / std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2] + row[3] * row[3]);
+      sign / std::sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2] + row[3] * row[3]);
   for (int i = 0; i < 3; ++i) pose[i] = -k * row[i];
   pose[3] = k * row[3];
   for (int i = 0; i < 3; ++i) pose[4 + i] = -(R[i][0] * t[0] + R[i][1] * t[1] + R[i][2] * t[2]);

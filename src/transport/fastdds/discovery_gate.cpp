@@ -82,7 +82,7 @@ class GatedTransport final : public SendFilter {
   bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
             ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& deadline) override {
-    announces_ = is_announcement(bytes, size);
+    announces_through_ = is_announcement(bytes, size) ? through : nullptr;
     return SendFilter::send(through, bytes, size_without_statistics(bytes, size), begin, end,
                             deadline);
   }
@@ -108,7 +108,10 @@ class GatedTransport final : public SendFilter {
  private:
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
-    if (announces_ && !pace_.may_send(to, AnnouncementPace::Clock::now())) return false;
+    if (announces_through_ != nullptr &&
+        !pace_.may_send(announces_through_, to, AnnouncementPace::Clock::now())) {
+      return false;
+    }
     const std::uint32_t host = host_of(to);
     return host == 0 || descriptor_.throttle->may_send(host, to.port, SendThrottle::Clock::now());
   }
@@ -121,7 +124,7 @@ class GatedTransport final : public SendFilter {
   GatedDescriptor descriptor_;
   // Used by one thread at a time: Fast DDS sends with a lock of the participant held.
   AnnouncementPace pace_;
-  bool announces_ = false;  // what is being sent
+  ertps::SenderResource* announces_through_ = nullptr;  // null: what is sent is something else
 };
 
 etransport::TransportInterface* GatedDescriptor::create_transport() const {

@@ -57,9 +57,10 @@ bool is_announcement(const std::uint8_t* datagram, std::size_t size) {
   return false;
 }
 
-bool AnnouncementPace::may_send(const ertps::Locator_t& to, Clock::time_point now) {
-  const auto [known, first] =
-      sent_.try_emplace(to, Sent{now, client_ ? Clock::duration(kFirst) : Clock::duration(kTwice)});
+bool AnnouncementPace::may_send(const ertps::SenderResource* through, const ertps::Locator_t& to,
+                                Clock::time_point now) {
+  const Clock::duration pause = client_ ? Clock::duration(kFirst) : Clock::duration(kTwice);
+  const auto [known, first] = sent_.try_emplace({through, to}, Sent{now, pause});
   if (first) return true;
   Sent& sent = known->second;
   if (now - sent.last < sent.pause) return false;

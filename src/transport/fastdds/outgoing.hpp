@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include "transport/fastdds/compat.hpp"
 
@@ -38,7 +39,9 @@ class AnnouncementPace {
   explicit AnnouncementPace(bool client) : client_(client) {}
 
   /// Whether to send one; if so, it counts as sent.
-  [[nodiscard]] bool may_send(const ertps::Locator_t& to, Clock::time_point now);
+  /// @param through  the socket: a multicast goes through that of each interface
+  [[nodiscard]] bool may_send(const ertps::SenderResource* through, const ertps::Locator_t& to,
+                              Clock::time_point now);
 
  private:
   struct Sent {
@@ -47,7 +50,7 @@ class AnnouncementPace {
   };
 
   const bool client_;
-  std::map<ertps::Locator_t, Sent> sent_;
+  std::map<std::pair<const ertps::SenderResource*, ertps::Locator_t>, Sent> sent_;
 };
 
 }  // namespace tfdude::fastdds

@@ -92,22 +92,36 @@ TEST_CASE("outgoing: a client announces itself at longer and longer intervals") 
   const auto start = AnnouncementPace::Clock::now();
   std::vector<int> sent;
   for (int ms = 0; ms < 40; ms += 2) {
-    if (pace.may_send(locator(1), start + milliseconds(ms))) sent.push_back(ms);
+    if (pace.may_send(nullptr, locator(1), start + milliseconds(ms))) sent.push_back(ms);
   }
   CHECK(sent == std::vector<int>{0, 6, 16, 36});
-  CHECK(pace.may_send(locator(2), start + milliseconds(1)));
+  CHECK(pace.may_send(nullptr, locator(2), start + milliseconds(1)));
   // All of the later ones.
   for (int ms = 340; ms < 3000; ms += 300)
-    CHECK(pace.may_send(locator(1), start + milliseconds(ms)));
+    CHECK(pace.may_send(nullptr, locator(1), start + milliseconds(ms)));
 }
 
 TEST_CASE("outgoing: an owner's announcement is sent once to one address") {
   AnnouncementPace pace(false);
   const auto start = AnnouncementPace::Clock::now();
-  CHECK(pace.may_send(locator(1), start));
-  CHECK_FALSE(pace.may_send(locator(1), start + microseconds(30)));
-  CHECK(pace.may_send(locator(2), start + microseconds(30)));
-  for (int ms = 1; ms < 10; ++ms) CHECK(pace.may_send(locator(1), start + milliseconds(ms)));
+  CHECK(pace.may_send(nullptr, locator(1), start));
+  CHECK_FALSE(pace.may_send(nullptr, locator(1), start + microseconds(30)));
+  CHECK(pace.may_send(nullptr, locator(2), start + microseconds(30)));
+  for (int ms = 1; ms < 10; ++ms) {
+    CHECK(pace.may_send(nullptr, locator(1), start + milliseconds(ms)));
+  }
+}
+
+TEST_CASE("outgoing: an announcement is sent through the socket of each interface") {
+  AnnouncementPace pace(false);
+  const auto start = AnnouncementPace::Clock::now();
+  int interfaces[2];
+  for (int& one : interfaces) {
+    // Only its address counts.
+    const auto* socket = reinterpret_cast<const ertps::SenderResource*>(&one);
+    CHECK(pace.may_send(socket, locator(1), start));
+    CHECK_FALSE(pace.may_send(socket, locator(1), start + microseconds(30)));
+  }
 }
 
 }  // namespace tfdude::fastdds
