@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kFew = 10;
 constexpr std::size_t kMany = 40;
-constexpr std::size_t kFramesEach = 20;  // they fit into one page
+constexpr std::size_t kFramesEach = 7;  // they fit into one page, with one more
 constexpr double kTimes = static_cast<double>(kMany) / kFew;
 // Ids are longer by a digit, and two messages may become one.
 constexpr double kAbout = 1.1;
