@@ -28,8 +28,8 @@ import wire_table
 
 BENCH = pathlib.Path(__file__).resolve().parent
 RESULTS = BENCH / "results"
-QUICK_STAGES = ("core", "contention", "memory", "net", "wire", "pushed", "narrow")
-STAGES = (*QUICK_STAGES, "many", "secured", "around")
+QUICK_STAGES = ("core", "contention", "memory", "net", "wire", "pushed")
+STAGES = (*QUICK_STAGES, "narrow", "many", "secured", "around")
 
 
 def on_the_wire(quick, bin_dir, work):
