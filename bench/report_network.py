@@ -48,6 +48,14 @@ UDP bytes: request + reply + other, and all packets. Centralized: one daemon own
 client asks. By the owner: the process that owns the frame. By another: a client, beside the owners.
 `2`: the thesis's example; `5` and `16`: partitions of two frames each.
 """
+SPLIT = """\
+**Does the split send less?** In the thesis's example, an update of an own edge sends {update_by_owner} bytes instead of
+{update_centralized}, a lookup of own frames {lookup_by_owner} instead of {lookup_centralized}, and an own add
+{add_by_owner} instead of {add_centralized}: its page goes to the other participants either way. Calls on the frames of
+others send the same as to a server, {update_by_other} bytes for an update. But each daemon announces itself: two send
+{idle_decentralized} bytes a second while nothing happens, one sends {idle_centralized}. So the split sends less once
+the robot makes more than {break_even} updates of own edges a second.
+"""
 ONE_SHOT = """\
 ### A program that asks once
 
@@ -137,6 +145,20 @@ def wire_table(figures):
     return table(("operation", *(title for _, title in hows)), rows)
 
 
+def split_text(figures):
+    """What the split saves in the thesis's example, and from how many updates a second on it pays."""
+    key = "wire/table/2"
+    said = {f"{operation}_{how}": value(figures, f"{key}/{how}/{operation}/total_udp", convert=as_measured)
+            for operation in ("update", "lookup", "add") for how in ("centralized", "by_owner", "by_other")}
+    said |= {f"idle_{where}": value(figures, f"{key}/{where}/idle/udp_per_second", convert=as_measured)
+             for where in ("centralized", "decentralized")}
+    if MISSING in said.values():
+        return ""
+    more = [figures[f"{key}/{where}/idle/udp_per_second"]["median"] for where in ("decentralized", "centralized")]
+    saved = [figures[f"{key}/{how}/update/total_udp"]["median"] for how in ("centralized", "by_owner")]
+    return SPLIT.format(**said, break_even=number(round((more[0] - more[1]) / (saved[0] - saved[1]))))
+
+
 def one_shot_table(figures):
     """The parts of the traffic of one question."""
     rows = [(name, *(value(figures, f"wire/one_shot/{side}/{key}", convert=as_measured) for side in ("ours", "bare")))
@@ -177,7 +199,7 @@ def wire_section(figures, _drawn, _home):
             "bytes for each existing process.\n"
             "- Discovery and presence of two daemons and a client that do nothing: "
             f"{size('idle/udp_per_second')} UDP bytes a second.\n",
-            WIRE_TABLE, wire_table(figures), ONE_SHOT, one_shot_table(figures)]
+            WIRE_TABLE, wire_table(figures), split_text(figures), ONE_SHOT, one_shot_table(figures)]
 
 
 def floor_section(figures, drawn, home):

@@ -134,7 +134,19 @@ void Pages::list_others(Page& page) const {
   }
 }
 
+// In turn, so that each has its turn in time.
+void Pages::repeat_old_pages() {
+  since_repeat_ += static_cast<std::uint32_t>(changed_.size());
+  const std::uint32_t period = count() == 0 ? 0 : std::max(kRepeatWithin / count(), 8U);
+  while (count() > 0 && since_repeat_ >= period) {
+    since_repeat_ -= period;
+    repeat_next_ = (repeat_next_ + 1) % count();
+    changed_.insert(repeat_next_);
+  }
+}
+
 std::vector<Page> Pages::take_changed() {
+  repeat_old_pages();
   note_epochs();
   std::vector<Page> changed;
   changed.reserve(changed_.size());

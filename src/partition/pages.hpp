@@ -37,6 +37,12 @@ class Pages {
   /// their number.
   static constexpr std::size_t kOthers = 16;
 
+  /// A page is published again, unchanged, before so many pages have been published after it, or
+  /// eight times as many as there are, if that is more. DDS numbers what an owner publishes, and
+  /// keeps only the latest of each page. A reader that misses one is told which numbers are gone.
+  /// Fast DDS walks these one by one: 570,000 took 70 ms, in which nothing else was received.
+  static constexpr std::uint32_t kRepeatWithin = 4096;
+
   struct Place {
     std::string parent;
     std::uint64_t lamport_time = 0;
@@ -103,6 +109,7 @@ class Pages {
   };
 
   std::uint32_t page_with_room();
+  void repeat_old_pages();
   void changed(std::uint32_t number, const std::string& id);
   void note_epochs();
   void list_others(Page& page) const;
@@ -120,6 +127,8 @@ class Pages {
   std::set<std::uint32_t> with_room_;
   std::set<std::uint32_t> changed_;
   std::uint32_t changed_latest_ = 0;
+  std::uint32_t since_repeat_ = 0;  // number of pages published
+  std::uint32_t repeat_next_ = 0;
   bool published_ = false;              // as this incarnation
   std::deque<PageEpoch> changed_last_;  // the latest first
   bool watching_ = false;

@@ -192,6 +192,26 @@ class Way {
   std::deque<Page> pages_;
 };
 
+TEST_CASE("a page that does not change is published again from time to time") {
+  Pages pages("robot", kLife);
+  for (int i = 0; i < 30; ++i) pages.put("f" + std::to_string(i), "", 1);
+  (void)pages.take_changed();
+  REQUIRE(pages.count() >= 3);
+  std::map<std::uint32_t, std::uint64_t> published;  // the number of the last publication
+  std::uint64_t number = 0;
+  std::uint64_t longest = 0;
+  for (int change = 0; change < 20'000; ++change) {
+    pages.put("f29", "", 2);
+    pages.close_epoch();
+    for (const Page& page : pages.take_changed()) published[page.number] = ++number;
+    for (std::uint32_t page = 0; page < pages.count(); ++page) {
+      longest = std::max(longest, number - published[page]);
+    }
+  }
+  CHECK(longest <= Pages::kRepeatWithin + pages.count());
+  CHECK(number <= 20'000 * (1 + 2.0 * pages.count() / Pages::kRepeatWithin));
+}
+
 TEST_CASE("a replica that receives the pages in order has the owner's structure") {
   Random random(0x9a6e5);
   INFO("seed " << random.seed());
