@@ -1,6 +1,7 @@
 """The value of each target in the reports so far: results/history.json, the oldest first.
 
-An entry has the date, commit and processor of a full run, and its values by the targets' full names. Values of another
+An entry has the date, commit and processor of a run, whether it was a quick one, and its values by the targets' full
+names. Values of another
 machine are not comparable unless they are ratios, so an entry names its machine.
 """
 
@@ -14,6 +15,7 @@ def entry(results):
     machine = results["machine"]
     values = {target.full_name: target.verdict(results["figures"])[0] for target in targets.TARGETS}
     return {"date": machine["date"], "commit": machine["commit"], "cpu": machine["cpu"],
+            "quick": bool(results["settings"].get("quick")),
             "values": {name: float(f"{value:.4g}") for name, value in values.items() if value is not None}}
 
 

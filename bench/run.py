@@ -87,8 +87,7 @@ def write(results, folder, report_file):
     text = json.dumps(results, indent=1, sort_keys=True)
     (folder / "latest.json").write_text(text + "\n", encoding="utf-8")
     past = history.with_entry(history.load(RESULTS / "history.json"), history.entry(results))
-    if not results["settings"].get("quick"):
-        history.save(folder / "history.json", past)
+    history.save(folder / "history.json", past)
     drawn = plots.draw(results["figures"], folder)
     report_file.write_text(report.text(results, past, drawn, report_file.parent), encoding="utf-8")
     if folder.resolve() == RESULTS:
