@@ -69,8 +69,8 @@ def targets_section(figures, past):
                        [(target.full_name, found, bound, f"**{verdict}**" if verdict == "NO" else verdict,
                          ", ".join(number(value) for _, value in history.before(past, target.full_name)) or "-")
                         for target, found, bound, verdict in rows]))
-    reports = "; ".join(f"{one['date'].split()[0]}, commit {one['commit']}" + (", a quick run" if one.get("quick") else "")
-                        for one in past[:-1])
+    reports = "; ".join(f"{one['date'].split()[0]}, commit {one['commit']}"
+                        + (", a quick run" if one.get("quick") else "") for one in past[:-1])
     lines.append(f"Earlier reports, the oldest first: {reports or 'none'} (`results/history.json`).\n")
     return "\n".join(lines)
 

@@ -61,7 +61,8 @@ class History(unittest.TestCase):
         self.assertEqual(history.before(known, "A: c"), [])
 
     def test_an_entry_has_the_value_of_each_target_that_has_figures(self):
-        made = history.entry({"machine": MACHINE, "settings": {}, "figures": {LOOKUP[0]: figure(900), LOOKUP[1]: figure(1800)}})
+        figures = {LOOKUP[0]: figure(900), LOOKUP[1]: figure(1800)}
+        made = history.entry({"machine": MACHINE, "settings": {}, "figures": figures})
         self.assertEqual(list(made["values"].values()), [0.5])
 
 
