@@ -22,6 +22,7 @@ import time
 
 import processes
 import scaling
+import usage
 
 START_S = 8.0
 IDLE_S = 6.0
@@ -30,9 +31,9 @@ ROUNDS = 15
 
 def received(span):
     """Bytes per second on the loopback interface."""
-    before, begin = scaling.loopback()[1], time.monotonic()
+    before, begin = usage.loopback()[1], time.monotonic()
     time.sleep(span)
-    return (scaling.loopback()[1] - before) / (time.monotonic() - begin)
+    return (usage.loopback()[1] - before) / (time.monotonic() - begin)
 
 
 @contextlib.contextmanager
@@ -49,27 +50,27 @@ def client(command):
 
 def idle_client(command, quiet):
     """What one client costs. `quiet`: bytes per second without it."""
-    before, begin = scaling.loopback()[1], time.monotonic()
+    before, begin = usage.loopback()[1], time.monotonic()
     with client(command) as process:
         ready = time.monotonic() - begin
         time.sleep(START_S - ready)
-        start = scaling.loopback()[1] - before - quiet * (time.monotonic() - begin)
+        start = usage.loopback()[1] - before - quiet * (time.monotonic() - begin)
         idle = received(IDLE_S) - quiet
         return {"ready_s": ready, "start_kB": start / 1000, "idle_kB_s": idle / 1000,
-                "rss_MiB": scaling.status_of(process.pid, "VmRSS") / 1024,
-                "anonymous_MiB": scaling.status_of(process.pid, "RssAnon") / 1024}
+                "rss_MiB": usage.status_of(process.pid, "VmRSS") / 1024,
+                "anonymous_MiB": usage.status_of(process.pid, "RssAnon") / 1024}
 
 
 def one_shot(command, quiet):
     """What a command costs that ends by itself: medians."""
     rows = []
     for _ in range(ROUNDS):
-        before, begin = scaling.loopback()[1], time.monotonic()
+        before, begin = usage.loopback()[1], time.monotonic()
         process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
+        _, status, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         took = time.monotonic() - begin
-        rows.append((took * 1000, (scaling.loopback()[1] - before - quiet * took) / 1000, usage.ru_maxrss / 1024))
+        rows.append((took * 1000, (usage.loopback()[1] - before - quiet * took) / 1000, used.ru_maxrss / 1024))
         time.sleep(0.2)
     ms, kilobytes, memory = (statistics.median(row[i] for row in rows) for i in range(3))
     return {"ms": ms, "kB": kilobytes, "max_rss_MiB": memory}

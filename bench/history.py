@@ -1,8 +1,7 @@
 """The value of each target in the reports so far: results/history.json, the oldest first.
 
 An entry has the date, commit and processor of a run, whether it was a quick one, and its values by the targets' full
-names. Values of another
-machine are not comparable unless they are ratios, so an entry names its machine.
+names. Values of another machine are not comparable unless they are ratios, so an entry names its machine.
 """
 
 import json

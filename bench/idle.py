@@ -21,6 +21,7 @@ import time
 
 import processes
 import scaling
+import usage
 
 IDLE_S = 6.0
 ANNOUNCED_EVERY_S = 0.3  # by each participant (profiles/loopback.xml)
@@ -36,10 +37,10 @@ def settle(started):
     begin = time.monotonic()
     counts = []
     while time.monotonic() < begin + SETTLED_WITHIN_S:
-        before = scaling.loopback()[0], sum(scaling.seconds_of(one.pid) for one in started)
+        before = usage.loopback()[0], sum(usage.seconds_of(one.pid) for one in started)
         time.sleep(1)
-        counts.append(scaling.loopback()[0] - before[0])
-        busy = sum(scaling.seconds_of(one.pid) for one in started) - before[1] > MOST_IDLE_CORES
+        counts.append(usage.loopback()[0] - before[0])
+        busy = sum(usage.seconds_of(one.pid) for one in started) - before[1] > MOST_IDLE_CORES
         last = counts[-CONSTANT_FOR_S:]
         if len(last) == CONSTANT_FOR_S and not busy and max(last) < 1.2 * min(last) + 20:
             return time.monotonic() - begin
@@ -51,9 +52,9 @@ def await_idle(packets_s):
     others have handled that."""
     deadline = time.monotonic() + processes.PATIENCE_S
     while time.monotonic() < deadline:
-        before = scaling.loopback()[0]
+        before = usage.loopback()[0]
         time.sleep(ANNOUNCED_EVERY_S)
-        if scaling.loopback()[0] - before < 1.2 * packets_s * ANNOUNCED_EVERY_S + 20:
+        if usage.loopback()[0] - before < 1.2 * packets_s * ANNOUNCED_EVERY_S + 20:
             return
     raise RuntimeError(f"the processes have not become idle within {processes.PATIENCE_S} s")
 
@@ -61,16 +62,16 @@ def await_idle(packets_s):
 def cost_of(started):
     """What these processes cost while nothing happens."""
     settled = settle(started)
-    before = scaling.loopback(), [scaling.seconds_of(one.pid) for one in started], time.monotonic()
+    before = usage.loopback(), [usage.seconds_of(one.pid) for one in started], time.monotonic()
     time.sleep(IDLE_S)
     span = time.monotonic() - before[2]
-    packets, size = scaling.loopback()
-    used = sum(scaling.seconds_of(one.pid) for one in started) - sum(before[1])
+    packets, size = usage.loopback()
+    used = sum(usage.seconds_of(one.pid) for one in started) - sum(before[1])
     threads = [len(list(pathlib.Path(f"/proc/{one.pid}/task").iterdir())) for one in started]
     return {"settled_s": settled, "packets_s": (packets - before[0][0]) / span,
             "kB_s": (size - before[0][1]) / span / 1000, "cores": used / span, "threads": statistics.median(threads),
-            "rss_kib": statistics.median(scaling.status_of(one.pid, "VmRSS") for one in started),
-            "anonymous_kib": statistics.median(scaling.status_of(one.pid, "RssAnon") for one in started)}
+            "rss_kib": statistics.median(usage.status_of(one.pid, "VmRSS") for one in started),
+            "anonymous_kib": statistics.median(usage.status_of(one.pid, "RssAnon") for one in started)}
 
 
 def milliseconds(command, questions, packets_s, status=0):

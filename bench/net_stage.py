@@ -19,6 +19,7 @@ from typing import Iterator
 
 import figures
 import processes
+import usage
 
 EXAMPLES = processes.ROOT / "examples" / "thesis"
 
@@ -96,15 +97,14 @@ class Stage:
 class Server:
     def __init__(self, process: subprocess.Popen, ready: str):
         self.ready = ready  # its line "ready ..."
-        self.stat = pathlib.Path(f"/proc/{process.pid}/stat")
+        self.pid = process.pid
 
     def udp_port(self) -> str:
         return self.ready.split("udp_port=")[1].strip()
 
     def cpu(self) -> float:
         """Processor time used so far [s]."""
-        user, system = self.stat.read_text().rsplit(")", 1)[1].split()[11:13]
-        return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+        return usage.seconds_of(self.pid)
 
 
 def ready_line(server: subprocess.Popen) -> str:

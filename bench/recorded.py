@@ -19,26 +19,13 @@ import tempfile
 import time
 
 import figures
+import usage
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BIN = ROOT / "build" / "release" / "bin"
 COMMON = ["--domain", "80", "--profile", str(ROOT / "profiles" / "loopback.xml")]
 WARM_UP_S = 2
 HEADERS = 110  # of Ethernet, IP, UDP and RTPS on each datagram [bytes]
-
-
-def loopback():
-    """(bytes, packets) received so far."""
-    for line in pathlib.Path("/proc/net/dev").read_text().splitlines():
-        if line.strip().startswith("lo:"):
-            fields = line.split(":")[1].split()
-            return int(fields[0]), int(fields[1])
-    raise RuntimeError("no loopback interface")
-
-
-def cpu_seconds(pid):
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def start(program, *arguments):
@@ -50,11 +37,11 @@ def load(mode, arguments, *more):
 
 
 def measured(process, seconds):
-    """Processor time per second of a process, and bytes per second of the network."""
+    """Processor time per second of a process, and packets and bytes per second of the network."""
     time.sleep(WARM_UP_S)
-    before = time.monotonic(), cpu_seconds(process.pid), loopback()
+    before = time.monotonic(), usage.seconds_of(process.pid), usage.loopback()
     time.sleep(seconds)
-    after = time.monotonic(), cpu_seconds(process.pid), loopback()
+    after = time.monotonic(), usage.seconds_of(process.pid), usage.loopback()
     span = after[0] - before[0]
     return (after[1] - before[1]) / span, [(b - a) / span for a, b in zip(before[2], after[2])]
 
@@ -89,7 +76,7 @@ def main():
             file = pathlib.Path(folder) / f"{way}.mcap"
             begin = time.monotonic()
             recorder = start("tfdude", *COMMON, "record", file, *options)
-            share[way], (bytes_rate, packets) = measured(recorder, arguments.seconds)
+            share[way], (packets, bytes_rate) = measured(recorder, arguments.seconds)
             end(recorder, signal.SIGINT)
             size[way] = file.stat().st_size / (time.monotonic() - begin)
             if way == "raw":

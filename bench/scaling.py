@@ -21,11 +21,11 @@ import tempfile
 import time
 
 import processes
+from usage import loopback, seconds_of, status_of
 
 IDLE_S = 5.0
 ADDED = 200
 LOOKUPS = 2000
-TICKS = os.sysconf("SC_CLK_TCK")
 SERVER_PORT = 11811
 
 
@@ -43,23 +43,6 @@ def enter_namespace():
     os.execvp("unshare", ["unshare", "-n", sys.executable, *sys.argv])
 
 
-def loopback():
-    """Packets and bytes that the loopback interface has received."""
-    for line in pathlib.Path("/proc/net/dev").read_text().splitlines():
-        name, _, counts = line.partition(":")
-        if name.strip() == "lo":
-            return int(counts.split()[1]), int(counts.split()[0])
-    raise RuntimeError("no loopback interface")
-
-
-def status_of(pid, key):
-    """A number in a process's status file, in the unit of that file."""
-    for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith(key + ":"):
-            return int(line.split()[1])
-    raise RuntimeError(f"process {pid} has no {key}")
-
-
 def wakes_of(pid):
     """How often the threads of a process have gone to sleep, which is how often they were woken."""
     total = 0
@@ -68,12 +51,6 @@ def wakes_of(pid):
             if line.startswith("voluntary_ctxt_switches:"):
                 total += int(line.split()[1])
     return total
-
-
-def seconds_of(pid):
-    """Processor time of a process [s]."""
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def configurations(work, count, frames):

@@ -20,21 +20,10 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 import figures  # noqa: E402
+import usage  # noqa: E402
 
 BIN = pathlib.Path(__file__).resolve().parents[2] / "build/release/bin"
 ROS_DOMAIN, DOMAIN = 231, 230
-
-
-def cpu_seconds(pid):
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def loopback_bytes():
-    for line in pathlib.Path("/proc/net/dev").read_text().splitlines():
-        if line.strip().startswith("lo:"):
-            return int(line.split(":")[1].split()[0])
-    return 0
 
 
 def end(process):
@@ -59,9 +48,9 @@ def measure(way, per_message, arguments):
     middle.stdout.readline()
     with subprocess.Popen([BIN / "ros_bench", way, *options], text=True, stdout=subprocess.PIPE) as ends:
         assert ends.stdout.readline().strip() == "begin"
-        before = time.monotonic(), cpu_seconds(middle.pid), loopback_bytes()
+        before = time.monotonic(), usage.seconds_of(middle.pid), usage.loopback()[1]
         assert ends.stdout.readline().strip() == "end"
-        after = time.monotonic(), cpu_seconds(middle.pid), loopback_bytes()
+        after = time.monotonic(), usage.seconds_of(middle.pid), usage.loopback()[1]
         result = json.loads(ends.stdout.readline())
     end(middle)
     seconds = after[0] - before[0]
@@ -79,11 +68,6 @@ def figures_of(way, per_message, one):
             figures.summary(f"{key}/bytes_per_edge", "bytes", [one["bytes_per_edge"]])]
 
 
-def resident_kib(pid):
-    lines = pathlib.Path(f"/proc/{pid}/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))
-
-
 def replay(arguments):
     """The memory of the bridge during a replay that jumps back every 10 s."""
     environment = {**os.environ, "ROS_DOMAIN_ID": str(ROS_DOMAIN), "ROS_LOCALHOST_ONLY": "1"}
@@ -97,7 +81,7 @@ def replay(arguments):
         begin = time.monotonic()
         while ends.poll() is None:
             time.sleep(min(10, arguments.seconds / 6))
-            print(f"{time.monotonic() - begin:.0f} s: {resident_kib(bridge.pid)} KiB", flush=True)
+            print(f"{time.monotonic() - begin:.0f} s: {usage.status_of(bridge.pid, 'VmRSS')} KiB", flush=True)
         print(ends.stdout.read().splitlines()[-1])
     end(bridge)
 

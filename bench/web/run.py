@@ -8,18 +8,17 @@ import asyncio
 import os
 import pathlib
 import subprocess
+import sys
 import time
 
 import websockets
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+import usage  # noqa: E402
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FRAMES = 1000
-
-
-def cpu_of(process):
-    """Processor time of a process so far [s]."""
-    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 async def count(url, seconds, results):
@@ -41,9 +40,9 @@ async def measure(url, pages, seconds, web, owner):
     results = []
     tasks = [asyncio.create_task(count(url, seconds, results)) for _ in range(pages)]
     await asyncio.sleep(3)
-    before, begin = (cpu_of(web), cpu_of(owner)), time.monotonic()
+    before, begin = (usage.seconds_of(web.pid), usage.seconds_of(owner.pid)), time.monotonic()
     await asyncio.sleep(seconds - 1)
-    after, spent = (cpu_of(web), cpu_of(owner)), time.monotonic() - begin
+    after, spent = (usage.seconds_of(web.pid), usage.seconds_of(owner.pid)), time.monotonic() - begin
     await asyncio.gather(*tasks)
     return [(b - a) / spent for a, b in zip(before, after)], results
 
