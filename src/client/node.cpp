@@ -56,10 +56,7 @@ Result<void> Node::release(const std::vector<std::string>& ids) {
 bool Node::responds(Milliseconds wait) { return participant_->member().responds(Deadline(wait)); }
 
 Subscription Node::on_taken(std::function<void(const Change&)> listener) {
-  return Subscription(participant_->member().on_conflict(
-      [own = partition(), listener = std::move(listener)](const Change& change) {
-        if (change.partition == own && change.frame.empty()) listener(change);
-      }));
+  return Subscription(participant_->member().on_taken(std::move(listener)));
 }
 
 RefusedCounts Node::refused() const { return participant_->refused(); }

@@ -134,11 +134,12 @@ void Pages::list_others(Page& page) const {
   }
 }
 
-// In turn, so that each has its turn in time.
+// One after the other, so that none is left out.
 void Pages::repeat_old_pages() {
+  if (pages_.empty()) return;
   since_repeat_ += static_cast<std::uint32_t>(changed_.size());
-  const std::uint32_t period = count() == 0 ? 0 : std::max(kRepeatWithin / count(), 8U);
-  while (count() > 0 && since_repeat_ >= period) {
+  const std::uint32_t period = std::max(kRepeatWithin / count(), 8U);
+  while (since_repeat_ >= period) {
     since_repeat_ -= period;
     repeat_next_ = (repeat_next_ + 1) % count();
     changed_.insert(repeat_next_);

@@ -275,9 +275,11 @@ std::shared_ptr<void> MemberRunner::on_change(Events::Callback listener) {
   return subscribe(std::move(listener));
 }
 
-std::shared_ptr<void> MemberRunner::on_conflict(const Events::Callback& listener) {
-  return subscribe([listener](const Change& change) {
-    if (change.kind == ChangeKind::kConflict) listener(change);
+// Conflicts are recorded anyway.
+std::shared_ptr<void> MemberRunner::on_taken(Events::Callback listener) {
+  return subscribe([own = name_, listener = std::move(listener)](const Change& change) {
+    const bool taken = change.partition == own && change.frame.empty();
+    if (change.kind == ChangeKind::kConflict && taken) listener(change);
   });
 }
 

@@ -121,8 +121,8 @@ class MemberRunner final : private CommitLoop::Effects {
 
   /// @return a handle; the listener ends when its last copy is destroyed
   [[nodiscard]] std::shared_ptr<void> on_change(Events::Callback listener);
-  /// Reports conflicts only, which are recorded anyway.
-  [[nodiscard]] std::shared_ptr<void> on_conflict(const Events::Callback& listener);
+  /// Reports only that another process has taken the partition.
+  [[nodiscard]] std::shared_ptr<void> on_taken(Events::Callback listener);
 
  private:
   [[nodiscard]] std::shared_ptr<void> subscribe(Events::Callback listener);

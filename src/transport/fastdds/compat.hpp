@@ -302,8 +302,9 @@ class SendFilter : public etransport::ChainingTransport {
   bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
             ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& deadline) override {
+    const std::uint32_t needed = size_to_send(through, bytes, size);
     return send_to(begin, end, [&](ertps::LocatorsIterator* from, ertps::LocatorsIterator* to) {
-      return through->send(bytes, size, from, to, deadline);
+      return through->send(bytes, needed, from, to, deadline);
     });
   }
 #else
@@ -324,6 +325,11 @@ class SendFilter : public etransport::ChainingTransport {
   }
 
  private:
+  /// How many bytes of a datagram to send. Not called by Fast DDS 3, which passes them in pieces.
+  virtual std::uint32_t size_to_send(ertps::SenderResource*, const ertps::octet*,
+                                     std::uint32_t size) {
+    return size;
+  }
   [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) = 0;
   virtual void heard(const ertps::Locator_t& from) const = 0;
 

@@ -78,16 +78,6 @@ class GatedTransport final : public SendFilter {
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
-#if TFDUDE_FASTDDS_MAJOR == 2
-  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
-            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& deadline) override {
-    announces_through_ = is_announcement(bytes, size) ? through : nullptr;
-    return SendFilter::send(through, bytes, size_without_statistics(bytes, size), begin, end,
-                            deadline);
-  }
-#endif
-
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
@@ -106,6 +96,12 @@ class GatedTransport final : public SendFilter {
   }
 
  private:
+  std::uint32_t size_to_send(ertps::SenderResource* through, const ertps::octet* bytes,
+                             std::uint32_t size) override {
+    announces_through_ = is_announcement(bytes, size) ? through : nullptr;
+    return size_without_statistics(bytes, size);
+  }
+
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) override {
     if (!descriptor_.open->load(std::memory_order_relaxed)) return false;
     if (announces_through_ != nullptr &&

@@ -77,10 +77,11 @@ Result<std::string> make_builtin_known(const std::string& name) TFDUDE_REQUIRES(
 Result<Profiles> Profiles::load(const std::string& file) {
   const Lock lock(loading());
   if (file.empty()) return Profiles({});
-  if (file == kLocalProfile)
+  if (file == kLocalProfile) {
     return make_known(builtin_text(kLocalProfiles)).map([](const std::string& ending) {
       return Profiles(ending);
     });
+  }
   std::ifstream stream(file);
   if (!stream.good()) {
     return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");
