@@ -6,7 +6,11 @@
 //
 // Keys: contention/WHO/READER/alone or /beside_writer (ns per lookup of 30 edges),
 // contention/WHO/batch (us for 100 edges), contention/ours/torn (lookups that saw half of a batch).
+// As a floor, contention/bare is the same for records of one cache line each, without a tree; and
+// contention/line (ns) is the time of one cache line from one processor to the other. It depends on
+// where the host runs the two: 50 and 330 ns were seen within one minute.
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdio>
@@ -116,6 +120,81 @@ class Tf2 {
   ros::Time stamp_{2};
 };
 
+/// A record for each edge: a sequence number, odd while it is written, and the pose as a quaternion
+/// and a translation.
+class Bare {
+ public:
+  void write(double angle) {
+    const auto q = turned(angle).rotation();
+    const std::array<double, 7> values{q.w(), q.x(), q.y(), q.z(), 0, 0, 0};
+    const auto start = Clock::now();
+    for (Record& record : records_) {
+      const std::uint64_t number = record.number.load(std::memory_order_relaxed);
+      record.number.store(number + 1, std::memory_order_relaxed);
+      std::atomic_thread_fence(std::memory_order_release);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        record.values[i].store(values[i], std::memory_order_relaxed);
+      }
+      record.number.store(number + 2, std::memory_order_release);
+    }
+    written_in_us = bench::microseconds_since(start);
+  }
+
+  [[nodiscard]] Pose read() const {
+    Pose path;
+    for (std::size_t i = 0; i < kDepth; ++i) path = path * records_[i].read();
+    return path;
+  }
+
+  double written_in_us = 0;
+
+ private:
+  struct alignas(64) Record {
+    [[nodiscard]] Pose read() const {
+      for (;;) {
+        const std::uint64_t before = number.load(std::memory_order_acquire);
+        std::array<double, 7> v{};
+        for (std::size_t i = 0; i < v.size(); ++i) v[i] = values[i].load(std::memory_order_relaxed);
+        std::atomic_thread_fence(std::memory_order_acquire);
+        if (before % 2 == 0 && number.load(std::memory_order_relaxed) == before) {
+          return Pose::trusted({v[0], v[1], v[2], v[3]}, {v[4], v[5], v[6]});
+        }
+      }
+    }
+
+    std::atomic<std::uint64_t> number{0};
+    std::array<std::atomic<double>, 7> values{1, 0, 0, 0, 0, 0, 0};
+  };
+
+  std::array<Record, kJoints> records_;
+};
+
+/// The time of one cache line from one processor to the other: two threads count up in turn.
+void measure_line(int repetitions) {
+  constexpr long kTurns = 20000;
+  Series line("contention/line", "ns");
+  for (int i = 0; i < repetitions; ++i) {
+    alignas(64) std::atomic<long> count{0};
+    const auto count_up_from = [&](long first) {
+      for (long turn = first; turn < 2 * kTurns; turn += 2) {
+        while (count.load(std::memory_order_acquire) != turn) {
+        }
+        count.store(turn + 1, std::memory_order_release);
+      }
+    };
+    std::thread other([&] {
+      pin(1);
+      count_up_from(1);
+    });
+    const auto start = Clock::now();
+    count_up_from(0);
+    other.join();
+    line.add(1e3 * bench::microseconds_since(start) / (2 * kTurns));
+    line.end_repetition();
+  }
+  line.print();
+}
+
 /// Writes a batch every millisecond until it is destroyed.
 template <class Who>
 class Writer {
@@ -199,6 +278,12 @@ int main(int argc, char** argv) {
   torn.end_repetition();
   torn.print();
   ours_batch.print();
+  Bare bare;
+  Series bare_batch("contention/bare/batch", "us");
+  measure("contention/bare/pose", bare, bare_batch, seconds, repetitions,
+          [&] { (void)bare.read(); });
+  bare_batch.print();
+  measure_line(10 * repetitions);
   Tf2 tf2;
   Series tf2_batch("contention/tf2/batch", "us");
   measure("contention/tf2/pose", tf2, tf2_batch, seconds, repetitions, [&] { (void)tf2.read(); });

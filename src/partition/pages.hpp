@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -25,7 +26,7 @@ class Pages {
   /// The frames and tombstones that a page has room for. The first pages have little room, since
   /// each change sends a whole page; later ones have more, since whoever joins reads all pages.
   [[nodiscard]] static constexpr std::size_t room_of(std::uint32_t number) {
-    return number < 8 * (kPageSize - 8) ? 8 + number / 8 : kPageSize;
+    return std::min<std::size_t>(8 + number, kPageSize);
   }
 
   /// Tombstones kept; the oldest are dropped first.
