@@ -63,13 +63,20 @@ def busy(seconds=3):
         return None
 
 
+def _processor(flags):
+    """Its name, which virtual machines make vague, and its generation: the ratios depend on it."""
+    name = _first(r"^model name\s*:\s*(.+)$", flags, platform.processor() or "unknown")
+    family, model = (_first(rf"^{key}\s*:\s*(\d+)$", flags, "") for key in ("cpu family", "model"))
+    return f"{name}, family {family}, model {model}" if family and model else name
+
+
 def description(build_dir):
     """Properties of the machine and the build, by name."""
     cache = _read(pathlib.Path(build_dir) / "CMakeCache.txt")
     compiler = _first(r"^CMAKE_CXX_COMPILER:[A-Z]+=(.+)$", cache, "c++")
     flags = _read("/proc/cpuinfo")
     return {
-        "cpu": _first(r"^model name\s*:\s*(.+)$", flags, platform.processor() or "unknown"),
+        "cpu": _processor(flags),
         "vector instructions": " ".join(name for name in ("avx2", "fma", "avx512f")
                                         if re.search(rf"\b{name}\b", flags)) or "unknown",
         "cores": os.cpu_count(),

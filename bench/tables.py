@@ -66,7 +66,7 @@ def filled(text, results):
     """A page's text with its tables written anew."""
     machine = results["machine"]
     when = f"\nMeasured on {machine['date'].split()[0]} on a virtual machine with {machine['cores']} cores " \
-           f"({machine['cpu']}, Debian's Fast DDS and tf2).\n"
+           f"({machine['cpu']}; Debian's Fast DDS and tf2).\nThe ratios differ between machines.\n"
     return PLACE.sub(lambda found: found[1] + table(results["figures"], found[2]) + when + found[3], text)
 
 
