@@ -207,21 +207,21 @@ WHY = {
     "Floor: ":
         "Planning, the codec, the filters and accounting take two to three microseconds of a round trip in both "
         "processes together, if the processor still has their code at hand when a thread wakes up. Where it has to "
-        "fetch it again, as on this machine, they take 10 to 20, and also make Fast DDS's own code slower "
+        "fetch it again, they take 10 to 20, and also make Fast DDS's own code slower "
         "([performance](../docs/performance.md#the-ratios-depend-on-the-machine)).",
     "Stream: ":
-        "The owner's thread wakes up for each message, and its code is fetched again, as on the floor: on the machine "
-        "of the report before it took 3 %.",
+        "The owner's thread wakes up for each message, so the share depends on the machine, as on the floor: 100 edges "
+        "took 3 % of one and 7 % of another ([performance](../docs/performance.md#the-ratios-depend-on-the-machine)).",
     "Core: lookup with covariance":
-        "On the same machine, the commit of the first report (13ff0c78) takes 0.91 of tf2's time for 30 edges. Seven "
-        "tenths of a lookup are the chain of multiplications, a quarter is following the path. How tf2 and a chain of "
-        "multiplications compare depends on the processor: on that of the report before, this lookup took 0.37 of "
-        "tf2's time ([performance](../docs/performance.md#the-ratios-depend-on-the-machine)).",
+        "Seven tenths of a lookup are the chain of multiplications, a quarter is following the path. How tf2 and a "
+        "chain of multiplications compare depends on the processor: for 30 edges the ratio was 0.37 on one, and 0.70 "
+        "on another, where the commit of the first report (13ff0c78) had 0.91 "
+        "([performance](../docs/performance.md#the-ratios-depend-on-the-machine)).",
     "Core: lookup of the pose only":
         "Half of it is the chain of multiplications, and half following the path, which takes 5 ns for each edge. The "
         "commit of the first report takes as long on the same machine.",
     "Core: lookup over 30 own edges":
-        "As for lookups with covariance: 2.3 µs on the machine of the report before.",
+        "Like lookups with covariance, it depends on the processor: 2.3 µs on one, 3.2 µs on another.",
     "Core: set an edge":
         "The locked instruction of the writers' lock takes 5 ns, and waits for the stores before it. A "
         "record that is copied under such a lock, without any check, takes 8 ns: 0.04 of tf2.",

@@ -29,9 +29,19 @@ namespace tfdude::testing {
   return out.str();
 }
 
+/// By how much two ways to compute the same may differ: not at all, unless the compiler fuses
+/// multiplications and additions, as on AArch64.
+#ifdef __FP_FAST_FMA
+inline constexpr double kRounding = 1e-15;
+#else
+inline constexpr double kRounding = 0.0;
+#endif
+
 /// Angle [rad] between two rotations; a quaternion and its negative are the same rotation.
 [[nodiscard]] inline double angle_between(const Eigen::Quaterniond& a,
                                           const Eigen::Quaterniond& b) {
+  // Fused multiplications and additions would not cancel.
+  if (a.coeffs() == b.coeffs()) return 0.0;
   const Eigen::Quaterniond d = a.conjugate() * b;
   return 2.0 * std::atan2(d.vec().norm(), std::abs(d.w()));
 }
@@ -40,10 +50,7 @@ namespace tfdude::testing {
 /// most `tol`; else both poses for people. A NaN is always a difference.
 [[nodiscard]] inline std::string pose_diff(const Pose& actual, const Pose& expected, double tol) {
   const double metres = (actual.translation() - expected.translation()).lpNorm<Eigen::Infinity>();
-  // Where the compiler fuses multiplications and additions, a rotation and its inverse do not
-  // cancel.
-  const bool same = actual.rotation().coeffs() == expected.rotation().coeffs();
-  const double radians = same ? 0 : angle_between(actual.rotation(), expected.rotation());
+  const double radians = angle_between(actual.rotation(), expected.rotation());
   if (metres <= tol && radians <= tol) return "";
   std::ostringstream out;
   out << "poses differ by " << metres << " m and " << radians << " rad, tolerance " << tol

@@ -14,6 +14,7 @@ namespace {
 using testing::cholesky_root;
 using testing::ContainsSubstring;
 using testing::Gaussian;
+using testing::kRounding;
 using testing::Random;
 using testing::transform_diff;
 
@@ -146,7 +147,7 @@ TEST_CASE("Covariance intersection dominates the error for any correlation") {
   const Transform small{truth, random.covariance(1e-4, 1e-4)};
   const auto kept = intersect(small, {truth, random.covariance(1.0, 1.0)});
   REQUIRE(kept);
-  CHECK(transform_diff(kept->X, small, 1e-15) == "");
+  CHECK(transform_diff(kept->X, small, kRounding) == "");
 }
 
 TEST_CASE("Quantiles of the chi-squared distribution are those of published tables") {
