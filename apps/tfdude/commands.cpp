@@ -1,5 +1,6 @@
 #include "commands.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <ctime>
@@ -126,19 +127,57 @@ int report(const Error& error, const Arguments& arguments) {
 
 namespace {
 
-// The tree as text and as JSON; no frames at all if nobody answers.
-Result<std::pair<std::string, nlohmann::json>> tree_of(Source source) {
-  const auto frames = source.frames();
-  if (!frames) return tl::unexpected(frames.error());
-  const auto partitions = source.partitions();
-  if (!partitions) return tl::unexpected(partitions.error());
-  std::vector<std::string> unreachable;
-  for (const PartitionInfo& partition : *partitions) {
-    if (!partition.reachable) unreachable.push_back(partition.name);
+/// All frames, and the partitions that are not reachable.
+struct Structure {
+  std::vector<Frame> frames;
+  std::vector<PartitionInfo> absent;
+
+  [[nodiscard]] std::vector<std::string> absent_names() const {
+    std::vector<std::string> names;
+    for (const PartitionInfo& partition : absent) names.push_back(partition.name);
+    return names;
   }
-  nlohmann::json json = nlohmann::json::array();
-  for (const Frame& frame : *frames) json.push_back(frame_json(frame));
-  return std::pair(draw_tree(*frames, unreachable), std::move(json));
+  [[nodiscard]] nlohmann::json json() const {
+    const auto names = absent_names();
+    nlohmann::json all = nlohmann::json::array();
+    for (const Frame& frame : frames) {
+      all.push_back(frame_json(frame));
+      all.back()["reachable"] = std::count(names.begin(), names.end(), frame.partition) == 0;
+    }
+    return all;
+  }
+  /// A line for each partition that is not reachable.
+  [[nodiscard]] std::string warnings() const {
+    std::string text;
+    for (const PartitionInfo& one : absent) {
+      const auto count = std::count_if(frames.begin(), frames.end(), [&](const Frame& frame) {
+        return frame.partition == one.name;
+      });
+      text += "partition " + quote(one.name) + " " + why_absent(one) + " since " +
+              to_string(one.since) + ": " +
+              (count == 0 ? "its frames are not known here"
+                          : "its " + std::to_string(count) +
+                                " frames are listed as they were last known") +
+              "\n";
+    }
+    return text;
+  }
+};
+
+Result<Structure> structure_of(Source source) {
+  auto frames = source.frames();
+  if (!frames) return tl::unexpected(std::move(frames.error()));
+  auto partitions = source.partitions();
+  if (!partitions) return tl::unexpected(std::move(partitions.error()));
+  Structure all{*std::move(frames), {}};
+  for (PartitionInfo& partition : *partitions) {
+    if (!partition.reachable && partition.compatible()) all.absent.push_back(std::move(partition));
+  }
+  return all;
+}
+
+void warn(const Structure& structure, const Arguments& arguments) {
+  if (!arguments.json) std::fputs(structure.warnings().c_str(), stderr);
 }
 
 }  // namespace
@@ -146,33 +185,33 @@ Result<std::pair<std::string, nlohmann::json>> tree_of(Source source) {
 int run_tree(Source source, const Arguments& arguments) {
   Screen screen;
   do {
-    const auto tree = tree_of(source);
-    if (!tree) return report(tree.error(), arguments);
+    const auto all = structure_of(source);
+    if (!all) return report(all.error(), arguments);
     if (!arguments.watch) {
-      const int status = none_there(source, arguments, !tree->second.empty());
+      const int status = none_there(source, arguments, !all->frames.empty());
       if (status != kDone) return status;
     }
+    const std::string tree = draw_tree(all->frames, all->absent_names());
     if (arguments.json || !arguments.watch) {
-      (void)answer(arguments, {{"frames", tree->second}}, tree->first);
+      (void)answer(arguments, {{"frames", all->json()}}, tree);
+      warn(*all, arguments);
     } else {
-      screen.redraw(tree->first.empty() ? nobody_answers(arguments) + "\n" : tree->first);
+      screen.redraw(tree.empty() ? nobody_answers(arguments) + "\n" : tree + all->warnings());
     }
   } while (arguments.watch && !interrupted_within(1.0 / arguments.rate));
   return kDone;
 }
 
 int run_frames(Source source, const Arguments& arguments) {
-  const auto frames = source.frames();
-  if (!frames) return report(frames.error(), arguments);
-  if (const int status = none_there(source, arguments, !frames->empty()); status != kDone)
+  const auto all = structure_of(source);
+  if (!all) return report(all.error(), arguments);
+  if (const int status = none_there(source, arguments, !all->frames.empty()); status != kDone)
     return status;
-  nlohmann::json json = nlohmann::json::array();
   std::string text;
-  for (const Frame& frame : *frames) {
-    json.push_back(frame_json(frame));
-    text += frame.id + "\n";
-  }
-  return answer(arguments, {{"frames", json}}, text);
+  for (const Frame& frame : all->frames) text += frame.id + "\n";
+  const int status = answer(arguments, {{"frames", all->json()}}, text);
+  warn(*all, arguments);
+  return status;
 }
 
 int run_partitions(Client& client, const Arguments& arguments) {

@@ -78,7 +78,10 @@ void Directory::apply(const Presence& presence, Time now) {
   }
   PartitionInfo& info = partition.info;
   const bool known_to_be_up = info.reachable && partition.announced == presence.incarnation;
-  if (!known_to_be_up) changes_.partition_up(info.name, presence.host, presence.pid);
+  if (!known_to_be_up) {
+    ++version_;
+    changes_.partition_up(info.name, presence.host, presence.pid);
+  }
   partition.announced = presence.incarnation;
   info.host = presence.host;
   info.pid = presence.pid;
@@ -100,6 +103,7 @@ void Directory::apply(const Page& page) {
   if (page.incarnation > partition.live) {
     // A participant that sends news of an incarnation is alive, even if its presence, which carries
     // the time, arrives after a page.
+    ++version_;
     partition.live = page.incarnation;
     if (!partition.info.reachable) partition.info.since = Time{};
     came_back(partition, owner);
@@ -190,6 +194,8 @@ void Directory::forget_joint(const PageJoint& joint, Owner owner) {
 }
 
 void Directory::replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner) {
+  if (kept.joints == joints) return;
+  ++version_;
   for (const PageJoint& joint : kept.joints) forget_joint(joint, owner);
   kept.joints = joints;
   for (const PageJoint& joint : joints) add_joint(joint, owner);
@@ -379,14 +385,6 @@ std::vector<PartitionInfo> Directory::partitions() const {
   std::sort(all.begin(), all.end(),
             [](const PartitionInfo& a, const PartitionInfo& b) { return a.name < b.name; });
   return all;
-}
-
-std::optional<Presence> Directory::serving(std::string_view partition) const {
-  const auto number = owner(partition);
-  if (!number || *number == kHeldHere || !reachable(*number)) return std::nullopt;
-  const Known& there = partitions_[*number];
-  return Presence{there.info.name, there.live,       there.info.host,
-                  there.info.pid,  there.page_count, true};
 }
 
 }  // namespace tfdude

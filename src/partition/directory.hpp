@@ -88,8 +88,14 @@ class Directory {
   [[nodiscard]] std::vector<Outdated> take_outdated() { return std::exchange(outdated_, {}); }
 
   /// Adds a joint of this process's partition.
-  void put_own_joint(const PageJoint& joint) { add_joint(joint, kHeldHere); }
-  void erase_own_joint(const PageJoint& joint) { forget_joint(joint, kHeldHere); }
+  void put_own_joint(const PageJoint& joint) {
+    ++version_;
+    add_joint(joint, kHeldHere);
+  }
+  void erase_own_joint(const PageJoint& joint) {
+    ++version_;
+    forget_joint(joint, kHeldHere);
+  }
 
   /// The owners of a joint of this name, or of one that follows it, without duplicates. O(log
   /// joints).
@@ -168,6 +174,10 @@ class Directory {
   /// A partition that others miss, and of which nothing else is known here.
   [[nodiscard]] std::optional<PartitionInfo> only_heard_of() const;
 
+  /// Changes with everything beside the forest's structure that a plan depends on: which partitions
+  /// are reachable, as which process, and who owns which joint.
+  [[nodiscard]] std::uint64_t version() const { return version_; }
+
   /// The other partitions that are reachable.
   [[nodiscard]] std::vector<Owner> reachable_owners() const;
 
@@ -176,6 +186,8 @@ class Directory {
 
   /// The live incarnation of a partition, if one is known.
   [[nodiscard]] std::optional<Presence> serving(std::string_view partition) const;
+  /// Whether that incarnation has also announced itself, and not only sent pages.
+  [[nodiscard]] bool announced(std::string_view partition) const;
 
  private:
   using PageMap = std::map<std::uint32_t, Page>;
@@ -262,6 +274,7 @@ class Directory {
   std::uint64_t own_forgotten_ = 0;  // the latest one that others have forgotten
   std::vector<Outdated> outdated_;
   bool without_pages_ = false;
+  std::uint64_t version_ = 0;
 };
 
 }  // namespace tfdude

@@ -39,7 +39,7 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
 }
 
 void Directory::came_back(Known& partition, Owner owner) {
-  partition.info.reachable = true;
+  if (!std::exchange(partition.info.reachable, true)) ++version_;
   partition.info.stopped = false;
   partition.forgotten = false;
   // One that was forgotten is told so until it continues with a higher number.
@@ -53,7 +53,7 @@ void Directory::came_back(Known& partition, Owner owner) {
 
 void Directory::went(Known& partition, Owner owner, bool stopped, Time now,
                      std::chrono::nanoseconds early) {
-  partition.info.reachable = false;
+  if (std::exchange(partition.info.reachable, false)) ++version_;
   partition.info.stopped = stopped;
   partition.info.since = now;
   absences_.went(partition.info.name, partition.live, stopped, now, early);
@@ -237,6 +237,20 @@ std::optional<PartitionInfo> Directory::only_heard_of() const {
       [](const Known& partition) { return partition.live == 0 && partition.listed(); });
   if (one == partitions_.end()) return std::nullopt;
   return one->info;
+}
+
+std::optional<Presence> Directory::serving(std::string_view partition) const {
+  const auto number = owner(partition);
+  if (!number || *number == kHeldHere || !reachable(*number)) return std::nullopt;
+  const Known& there = partitions_[*number];
+  return Presence{there.info.name, there.live,       there.info.host,
+                  there.info.pid,  there.page_count, true};
+}
+
+bool Directory::announced(std::string_view partition) const {
+  const auto number = owner(partition);
+  if (!number || *number == kHeldHere || !reachable(*number)) return false;
+  return partitions_[*number].announced == partitions_[*number].live;
 }
 
 }  // namespace tfdude

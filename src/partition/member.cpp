@@ -18,7 +18,7 @@ void Member::look_for_contests() {
 
 void Member::on_page(const Page& page) {
   directory_.apply(page);
-  outcome_.heard = outcome_.routes = true;
+  outcome_.heard = true;
   look_for_contests();
 }
 
@@ -29,12 +29,12 @@ void Member::on_presence(const Presence& presence, Time now) {
     overtake(now);
     return;
   }
-  const bool before = directory_.serving(presence.partition).has_value();
+  const bool was_reachable = directory_.serving(presence.partition).has_value();
+  const bool was_announced = directory_.announced(presence.partition);
   directory_.apply(presence, now);
-  const bool after = directory_.serving(presence.partition).has_value();
-  if (after && !before) outcome_.appeared = presence;
-  if (before && !after) outcome_.stopped = presence;
-  if (before != after) outcome_.others = outcome_.routes = true;
+  // Its pages may have come before.
+  if (!was_announced && directory_.announced(presence.partition)) outcome_.appeared = presence;
+  if (was_reachable && !directory_.serving(presence.partition)) outcome_.stopped = presence;
   outcome_.look_for_gone = directory_.any_pending();
   overtake(now);
   if (partition_ != nullptr) outcome_.to_commit = true;
@@ -60,7 +60,7 @@ void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Ti
   }
   if (!directory_.lost(partition, incarnation, now, early)) return;
   outcome_.lost = partition;
-  outcome_.others = outcome_.routes = outcome_.look_for_gone = true;
+  outcome_.look_for_gone = true;
   if (partition_ != nullptr) outcome_.to_commit = true;
 }
 
@@ -68,7 +68,7 @@ void Member::on_time(Steady now) {
   const bool gone = directory_.look_for_gone(now);
   outcome_.look_for_gone = directory_.any_pending();
   if (!gone) return;
-  outcome_.heard = outcome_.others = outcome_.routes = true;
+  outcome_.heard = true;
   if (partition_ != nullptr) outcome_.to_commit = true;
 }
 
@@ -82,7 +82,6 @@ std::optional<Reply> Member::on_request(const PeerId& from, const Request& reque
     reply = partition_->refuse(from, request, *refusal, now);
   } else {
     reply = partition_->answer(from, request, now);
-    outcome_.routes = is_of_structure(request);
     look_for_contests();
   }
   // Changes that are not stored are not announced, however long that takes.
@@ -101,7 +100,6 @@ Reply Member::answer(const Request& request, const std::optional<Error>& refusal
   if (refusal && is_of_structure(request)) return {request.sequence, 0, *refusal};
   Reply reply = partition_->answer(request, now);
   look_for_contests();
-  outcome_.routes = is_of_structure(request);
   // This process sees the change already; the others are informed asynchronously.
   outcome_.to_commit = !is_of_values(request) && !is_read_only(request);
   return reply;
@@ -109,13 +107,13 @@ Reply Member::answer(const Request& request, const std::optional<Error>& refusal
 
 Result<void> Member::release(const std::vector<std::string>& ids, Time now) {
   auto released = partition_->release(ids, now);
-  if (released) outcome_.to_commit = outcome_.routes = true;
+  if (released) outcome_.to_commit = true;
   return released;
 }
 
 Result<void> Member::forget(const std::string& partition, Time now) {
   auto forgotten = directory_.forget(partition, 0, now);
-  if (forgotten) outcome_.heard = outcome_.routes = true;
+  if (forgotten) outcome_.heard = true;
   return forgotten;
 }
 
@@ -126,7 +124,7 @@ std::set<PendingYield> Member::pending_yields() const {
 
 void Member::yield(const std::set<PendingYield>& due, bool current, Time now) {
   if (partition_ == nullptr || !given_up_.empty()) return;
-  if (current && partition_->yield(due, now)) outcome_.to_commit = outcome_.routes = true;
+  if (current && partition_->yield(due, now)) outcome_.to_commit = true;
   if (!partition_->pending_yields().empty()) outcome_.to_yield = true;
 }
 
@@ -236,7 +234,14 @@ std::optional<Presence> Member::not_stored(const Ready& ready) {
   return announced_;
 }
 
+// The one place that says so: whoever waits for a plan, or keeps one, plans again.
+void Member::compare_plans() {
+  const std::pair now{forest_.structure_version(), directory_.version()};
+  outcome_.routes = now != std::exchange(planned_with_, now);
+}
+
 Outcome Member::take_outcome() {
+  compare_plans();
   outcome_.outdated = directory_.take_outdated();
   outcome_.events = directory_.changes().take();
   return std::exchange(outcome_, {});

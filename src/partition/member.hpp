@@ -113,6 +113,7 @@ class Member {
   void give_up(const Presence& rival);
   void overtake(Time now);
   void look_for_contests();
+  void compare_plans();
 
   Forest& forest_;
   Directory& directory_;
@@ -124,6 +125,7 @@ class Member {
   IncarnationSource incarnations_;
   std::string given_up_;
   bool stores_ = false;
+  std::pair<std::uint64_t, std::uint64_t> planned_with_{};  // versions at the last outcome
   std::uint64_t told_epoch_ = 0;  // of the published structure
   std::map<std::pair<PeerId, std::uint32_t>, PendingReply> replies_;
   Outcome outcome_;

@@ -42,8 +42,8 @@ struct Outcome {
   std::optional<std::uint64_t> overtook{};  ///< the incarnation as which this process continues
   bool gave_up = false;                     ///< the own partition was given up, to the rival
   bool heard = false;                       ///< a message of others was processed
-  bool others = false;                      ///< other partitions have appeared or disappeared
-  bool routes = false;                      ///< frames have moved, or changed their owners
+  /// What a plan would find has changed: frames, their owners, or which partitions are reachable.
+  bool routes = false;
   bool to_commit = false;      ///< take_ready() should be called soon, as there may be changes
   bool to_reply = false;       ///< take_ready() should be called at once, as a reply is due
   bool to_yield = false;       ///< a yield may be pending

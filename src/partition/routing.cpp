@@ -18,9 +18,12 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
 Result<void> check_reachable(const Directory& directory, Owner owner) {
   if (owner == kHeldHere || directory.reachable(owner)) return {};
   const PartitionInfo& info = directory.info(owner);
-  return fail(Errc::kUnreachable, "partition " + quote(info.name) + " (host " + info.host +
-                                      ", pid " + std::to_string(info.pid) +
-                                      ") has not been reachable since " + to_string(info.since) +
+  const bool discovered = !info.host.empty();
+  const std::string process =
+      discovered ? " (host " + info.host + ", pid " + std::to_string(info.pid) + ")" : "";
+  return fail(Errc::kUnreachable, "partition " + quote(info.name) + process +
+                                      " has not been reachable since " + to_string(info.since) +
+                                      (discovered ? "" : ", before this process started") +
                                       ": it " + why_absent(info));
 }
 

@@ -74,7 +74,7 @@ class Lookups {
                                                             const std::string& b,
                                                             const Query& query, Milliseconds wait);
 
-  /// Another partition has appeared or disappeared.
+  /// What a plan would find has changed.
   void look_again() { pending_.look_again(); }
   /// Others have pushed values.
   void pushed() { pending_.pushed(); }

@@ -95,13 +95,12 @@ Outcome MemberRunner::take_outcome() {
 }
 
 void MemberRunner::react(const Outcome& outcome) {
-  if (outcome.heard) structure_.changed.notify_all();
+  if (outcome.heard || outcome.routes) structure_.changed.notify_all();
   if (outcome.routes) parts_.on_routes();
   if (outcome.to_commit) commits_->ask();
   if (outcome.to_reply) commits_->hurry();
   if (outcome.to_yield) parts_.on_contest();
   if (outcome.look_for_gone) look_for_gone();
-  if (outcome.others) parts_.on_others();
   if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
   if (outcome.lost) parts_.on_gone(*outcome.lost);
   log_outcome(outcome, name_);

@@ -34,8 +34,7 @@ class MemberRunner final : private CommitLoop::Effects {
 
   /// Notified of changes, by the thread that brought them.
   struct Parts {
-    std::function<void()> on_routes;  ///< frames have moved, or changed their owners
-    std::function<void()> on_others;  ///< another partition has appeared or disappeared
+    std::function<void()> on_routes;  ///< what a plan would find has changed
     /// The partition was stopped, or is lost.
     std::function<void(const std::string& partition)> on_gone;
     std::function<void()> on_contest;  ///< a yield may be pending

@@ -50,8 +50,8 @@ MemberRunner::Parts Participant::parts() {
   return {[this] {
             watcher_.look_again();
             streams_.look_again();
+            lookups_.look_again();
           },
-          [this] { lookups_.look_again(); },
           [this](const std::string& partition) { requests_.calls().on_lost(partition); },
           [this] { yielding_.ask(); }};
 }

@@ -37,7 +37,7 @@ class PartitionWatches {
   /// The partition is watched until FollowedPartition::stop().
   void add(std::shared_ptr<FollowedPartition> partition);
   void on_pushed(const PushedValues& pushed);
-  /// The structure or the reachable partitions have changed.
+  /// What a plan would find has changed.
   void look_again() { rounds_.ask(); }
 
  private:

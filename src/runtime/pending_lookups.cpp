@@ -111,12 +111,12 @@ void PendingLookups::wake(std::atomic<bool>& why) {
 }
 
 void PendingLookups::look_again() {
-  ++others_;
+  ++routes_;
   wake(written_);
 }
 
 std::uint64_t PendingLookups::version() const {
-  return forest_.structure_version() + others_.load();
+  return forest_.structure_version() + routes_.load();
 }
 
 void PendingLookups::run() {

@@ -76,7 +76,7 @@ class PendingLookups {
   [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
                                                     Error last, OneCall<Found>::Function callback);
 
-  /// Another partition has appeared or disappeared.
+  /// What plan() would find has changed.
   void look_again();
 
   /// Others have pushed values. Returns at once if no lookup waits.
@@ -127,7 +127,7 @@ class PendingLookups {
   const Links links_;
   Callbacks callbacks_;
   std::size_t count_ = 0;                 // number of waiting lookups; belongs to the thread
-  std::atomic<std::uint64_t> others_{0};  // how often partitions have appeared or disappeared
+  std::atomic<std::uint64_t> routes_{0};  // how often what plan() would find has changed
   std::atomic<bool> written_{false};      // new data may have arrived
   std::atomic<bool> urgent_{false};       // a new lookup or a reply has arrived
   Mutex mutex_;                           // guards the following members, and the wait

@@ -67,16 +67,48 @@ Result<std::vector<Frame>> Queries::followed() {
   return frames;
 }
 
+std::vector<KnownFrame> Queries::frames_before() {
+  const Deadline deadline = discovery_.call_deadline();
+  std::vector<Part> owners;
+  {
+    const Lock lock(structure_.mutex);
+    const Directory& directory = structure_.directory;
+    if (!directory.only_heard_of()) return {};
+    for (const Owner owner : directory.reachable_owners()) {
+      const FramesRequest all{{}, {std::string(1, kAnyName)}};
+      owners.push_back({owner, directory.name(owner), Request{0, directory.name(owner), all}});
+    }
+  }
+  for (Part& owner : owners) {
+    auto known = requests_.ask_list<KnownFrame>(std::move(owner), deadline);
+    if (known && !known->empty()) return *std::move(known);
+  }
+  return {};
+}
+
 Result<std::vector<Frame>> Queries::frames() {
   if (requests_.on_demand() != nullptr) return followed();
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  std::vector<KnownFrame> before = frames_before();
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());
+  std::set<std::string> lost;
   const Lock lock(structure_.mutex);
+  for (KnownFrame& frame : before) {
+    const auto owner = structure_.directory.owner(frame.partition);
+    const bool there = !owner || structure_.directory.reachable(*owner);
+    if (there || structure_.forest.exists(frame.id)) continue;
+    lost.insert(frame.id);
+    frames.push_back({std::move(frame.id), std::move(frame.parent), std::move(frame.partition)});
+  }
+  for (Frame& frame : frames) {
+    frame.attached = structure_.forest.exists(frame.parent) || lost.count(frame.parent) != 0;
+  }
   for (FrameInfo& info : infos) {
+    const bool attached = info.attached || lost.count(info.parent) != 0;
     frames.push_back({std::move(info.id), std::move(info.parent),
-                      structure_.directory.name(info.owner), info.attached});
+                      structure_.directory.name(info.owner), attached});
   }
   std::sort(frames.begin(), frames.end(),
             [](const Frame& a, const Frame& b) { return a.id < b.id; });

@@ -28,7 +28,7 @@ class Streams {
   [[nodiscard]] Result<std::shared_ptr<Sender<JointUpdate>>> joints(
       const std::vector<std::string>& names);
 
-  /// The structure or the reachable partitions have changed.
+  /// What a plan would find has changed.
   void look_again() {
     if (Deferred* planner = planning_.load()) planner->ask();
   }

@@ -97,7 +97,11 @@ Result<void> WatchedPath::health() const {
 void WatchedPath::set_health(Result<void> health) {
   const Lock lock(mutex_);
   health_ = std::move(health);
-  if (health_) not_connected_since_.reset();
+}
+
+void WatchedPath::planned() {
+  const Lock lock(mutex_);
+  not_connected_since_.reset();
 }
 
 bool WatchedPath::is_gone(const Error& error, Clock::time_point now) {

@@ -89,7 +89,9 @@ class WatchedPath {
   /// Whether the error means that the path no longer exists. The news of a move may come before
   /// that of its destination.
   [[nodiscard]] bool is_gone(const Error& error, Clock::time_point now);
-  /// Sets whether all owners are reachable.
+  /// It exists: is_gone() begins to count again.
+  void planned();
+  /// Sets whether all owners are reachable, and have sent their values since.
   void set_health(Result<void> health);
   [[nodiscard]] std::size_t edge_count() const;
   /// The groups whose values it needs.

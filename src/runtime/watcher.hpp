@@ -57,7 +57,7 @@ class Watcher {
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const;
 
-  /// The structure or the reachable partitions have changed.
+  /// What a plan would find has changed.
   void look_again();
 
  private:

@@ -83,21 +83,28 @@ bool Watches::attend(const Path& path, bool renew) {
   path->collect();
   auto route = links_.plan(*path);
   if (!route) return cannot_be_planned(path, std::move(route.error()));
-  path->set_health({});
-  if (!path->follows(*route)) {
-    if (path->prepare(*route)) tell_rerouted(path);
+  path->planned();
+  const bool well = follow(path, *route, renew);
+  // An owner that has returned has to send its values first: until then old ones are shown.
+  if (well) path->set_health({});
+  return well;
+}
+
+bool Watches::follow(const Path& path, WatchRoute& route, bool renew) {
+  if (!path->follows(route)) {
+    if (path->prepare(route)) tell_rerouted(path);
   } else if (!renew && path->up_to_date()) {
     return true;
   }
-  for (const WatchRoute::Source& source : route->sources) {
+  for (const WatchRoute::Source& source : route.sources) {
     if (!open_.contains(source.group) && links_.open(source.partition, source.group)) {
       open_.insert(source.group, Clock::now());
     }
   }
-  if (!ask(path, *route, path->lacks_history())) return false;
+  if (!ask(path, route, path->lacks_history())) return false;
   // Only the first answers show that one edge is ahead of the data of another.
   if (const auto from = path->lacks_history()) {
-    if (!ask(path, *route, from)) return false;
+    if (!ask(path, route, from)) return false;
   }
   return path->up_to_date();
 }

@@ -46,7 +46,7 @@ class Watches {
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const;
 
-  /// The structure or the reachable partitions have changed.
+  /// What a plan would find has changed.
   void look_again() { rounds_.ask(); }
 
  private:
@@ -57,6 +57,7 @@ class Watches {
   bool attend_all(bool renew);
   /// @return whether it is up to date; otherwise it must be retried soon
   bool attend(const Path& path, bool renew);
+  bool follow(const Path& path, WatchRoute& route, bool renew);
   bool cannot_be_planned(const Path& path, Error why);
   /// Requests all values from the owners, or samples from an instant on. @return whether all have
   /// answered

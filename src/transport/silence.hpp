@@ -13,6 +13,7 @@ struct Hearing {
 
   Time last{};
   std::optional<Time> needed_since{};
+  Time asked{};          ///< when it was last asked for a sign of life
   bool present = false;  ///< its presence has come
   bool replied = false;  ///< it is known to receive requests
 
@@ -52,7 +53,9 @@ struct Silence {
 inline constexpr std::chrono::milliseconds kProbeAfter{100};
 
 /// Judges a server that did not count as lost before. The silence of one that is needed begins when
-/// it is needed: earlier, nobody asked it.
+/// it is needed: earlier, nobody asked it. One that is needed and has not replied yet is asked even
+/// if it is heard: who only streams to it hears acknowledgements, which end with it, but not that it
+/// receives requests.
 [[nodiscard]] inline Silence judge(const Hearing& heard, const Patience& patience,
                                    Hearing::Time now) {
   const bool needed = heard.needed_since.has_value();
@@ -62,7 +65,9 @@ inline constexpr std::chrono::milliseconds kProbeAfter{100};
     const auto early = patience.others + patience.look_every - (now - heard.last);
     return {Silence::Kind::kLost, std::max<std::chrono::nanoseconds>(early, {})};
   }
-  return {needed && quiet >= kProbeAfter ? Silence::Kind::kAsk : Silence::Kind::kNone, {}};
+  const auto unasked = now - std::max(heard.asked, heard.needed_since.value_or(now));
+  const bool ask = quiet >= kProbeAfter || (!heard.replied && unasked >= kProbeAfter);
+  return {needed && ask ? Silence::Kind::kAsk : Silence::Kind::kNone, {}};
 }
 
 }  // namespace tfdude

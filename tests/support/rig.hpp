@@ -39,7 +39,7 @@ class Rig {
         transport(std::move(to)),
         discovery(structure, *transport, options.discovery, options.timeout),
         member(structure, *transport, partition,
-               {[this] { ++routes; }, [this] { ++others; },
+               {[this] { ++routes; },
                 [this](const std::string& name) {
                   {
                     const std::lock_guard lock(mutex);
@@ -80,7 +80,6 @@ class Rig {
   std::function<void(const PushedValues&)> pushed;
   std::function<Result<void>()> still_in;  // else the member's
   std::atomic<int> routes{0};
-  std::atomic<int> others{0};
   std::mutex mutex;
   std::vector<std::string> gone;  // partitions; under mutex
   Structure structure;

@@ -27,6 +27,10 @@ json met_json(const Met& met) {
 
 std::string met_text(const Met& met) {
   const PartitionInfo& partition = met.partition;
+  if (!partition.reachable && partition.compatible()) {
+    return format("%-12s ", partition.stopped ? "stopped" : "lost") + partition.name + ", since " +
+           to_string(partition.since) + "\n";
+  }
   std::string text = "met          " + partition.name + " on " + partition.host + ", process " +
                      std::to_string(partition.pid);
   if (met.clock) {

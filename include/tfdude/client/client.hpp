@@ -384,7 +384,8 @@ class TFDUDE_EXPORT Client {
   /// Whether a frame with this id is known here at the deadline at the latest. False also if that
   /// could not be determined, as without a network; parent() tells the two cases apart.
   [[nodiscard]] bool exists(const std::string& id);
-  /// All frames, sorted by id.
+  /// All frames, sorted by id; also those of partitions that were lost before this process started,
+  /// as an owner of others knows them.
   [[nodiscard]] Result<std::vector<Frame>> frames();
   /// All partitions, including unreachable ones, sorted by name.
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();

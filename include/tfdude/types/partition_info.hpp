@@ -13,7 +13,7 @@ namespace tfdude {
 /// Information about one partition.
 struct PartitionInfo {
   std::string name;
-  std::string host;
+  std::string host;  ///< empty: it was lost before this process could discover it
   std::uint32_t pid = 0;
   std::size_t frames = 0;
   bool reachable = false;

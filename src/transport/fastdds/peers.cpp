@@ -129,7 +129,10 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
     server.heard.need(needed.count(said->partition) != 0, now);
     if (server.silent) continue;
     const Silence silence = judge(server.heard, patience_, now);
-    if (silence.kind == Silence::Kind::kAsk) unheard.push_back(said->partition);
+    if (silence.kind == Silence::Kind::kAsk) {
+      server.heard.asked = now;
+      unheard.push_back(said->partition);
+    }
     if (silence.kind != Silence::Kind::kLost) continue;
     server.silent = true;
     gone_(*said, silence.early);

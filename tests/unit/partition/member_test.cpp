@@ -54,6 +54,64 @@ const Error kFull{Errc::kState, "the disk is full"};
 
 }  // namespace
 
+TEST_CASE("member: an owner that returns changes plans, whichever of its messages comes first") {
+  const bool page_first = GENERATE(true, false);
+  CAPTURE(page_first);
+  Replica replica;
+  Member member(replica.forest, replica.directory, "");
+  const auto plans_again = [&] { return member.take_outcome().routes; };
+  const auto come = [&](std::uint64_t incarnation) {
+    const Page page{"head", 0, incarnation, 1, {{"neck", "", 1}}};
+    if (page_first) member.on_page(page);
+    const bool by_page = page_first && plans_again();
+    member.on_presence(presence_of("head", incarnation, 1), kNow);
+    const bool by_presence = plans_again();
+    if (!page_first) member.on_page(page);
+    return std::pair(by_page, by_presence);
+  };
+  (void)come(1);
+  (void)plans_again();
+  member.on_page(Page{"head", 0, 1, 1, {{"neck", "", 1}}});
+  member.on_presence(presence_of("head", 1, 1), kNow);
+  CHECK_FALSE(plans_again());
+  member.on_lost("head", 1, kNow, {});
+  CHECK(plans_again());
+  // The same frames: only the way to them is there again.
+  const auto [by_page, by_presence] = come(2);
+  CHECK(by_page == page_first);
+  // By now it is known which process it is, and by which clock.
+  CHECK(by_presence);
+}
+
+TEST_CASE("member: joints that appear or vanish with a restart change plans") {
+  const bool page_first = GENERATE(true, false);
+  CAPTURE(page_first);
+  Replica replica;
+  Member member(replica.forest, replica.directory, "");
+  const auto owners = [&](const char* joint) {
+    return replica.directory.joint_owners(joint).size();
+  };
+  const auto input = [&](auto give) {
+    const auto before = std::pair(owners("pan"), owners("tilt"));
+    give();
+    const bool same = before == std::pair(owners("pan"), owners("tilt"));
+    const bool plans_again = member.take_outcome().routes;
+    CHECK((same || plans_again));
+  };
+  const auto come = [&](std::uint64_t incarnation, const std::string& joint) {
+    Page page{"head", 0, incarnation, 1, {{"neck", "", 1}}};
+    page.joints = {{joint, ""}};
+    if (page_first) input([&] { member.on_page(page); });
+    input([&] { member.on_presence(presence_of("head", incarnation, 1), kNow); });
+    if (!page_first) input([&] { member.on_page(page); });
+  };
+  come(1, "pan");
+  REQUIRE(owners("pan") == 1);
+  come(2, "tilt");
+  CHECK(owners("pan") == 0);
+  CHECK(owners("tilt") == 1);
+}
+
 TEST_CASE("member: a participant without frames receives messages and stores nothing") {
   Replica replica;
   Member member(replica.forest, replica.directory, "");

@@ -50,6 +50,24 @@ TEST_CASE("silence: a server that has not replied yet gets more time") {
   CHECK(kind_after(hearing, milliseconds(2000)) == Kind::kLost);
 }
 
+TEST_CASE("silence: a server that is only streamed to is asked although it acknowledges") {
+  Hearing hearing = heard(false);
+  hearing.need(true, kStart);
+  const auto acknowledged_at = [&](milliseconds time) {
+    hearing.last = kStart + time;
+    return kind_after(hearing, time);
+  };
+  CHECK(acknowledged_at(milliseconds(99)) == Kind::kNone);
+  CHECK(acknowledged_at(milliseconds(100)) == Kind::kAsk);
+  hearing.asked = kStart + milliseconds(100);
+  CHECK(acknowledged_at(milliseconds(199)) == Kind::kNone);
+  CHECK(acknowledged_at(milliseconds(200)) == Kind::kAsk);
+  hearing.replied = true;
+  CHECK(acknowledged_at(milliseconds(300)) == Kind::kNone);
+  CHECK(kind_after(hearing, milliseconds(749)) == Kind::kAsk);
+  CHECK(kind_after(hearing, milliseconds(750)) == Kind::kLost);
+}
+
 TEST_CASE("silence: a server without a presence gets more time") {
   Hearing hearing = heard(false);
   hearing.present = false;
