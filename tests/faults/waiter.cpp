@@ -63,7 +63,7 @@ void Waiter::wait() {
 void Waiter::attend(std::size_t partition, Waiting& waiting) {
   const double calm = journal_.calm();
   if (!waiting.answer.valid()) {
-    waiting = {waiting_.lookup_async("world", frames_[partition], {}, kWait)};
+    waiting = {waiting_.lookup_async("world", frames_[partition], {}, kWait), journal_.now()};
     return;
   }
   if (waiting.answer.wait_for(milliseconds(0)) == std::future_status::ready) {
@@ -73,7 +73,8 @@ void Waiter::attend(std::size_t partition, Waiting& waiting) {
     if (!found) journal_.violation("a waiting lookup failed: " + found.error().message);
     return;
   }
-  if (calm <= kGrace || std::exchange(waiting.reported, true)) return;
+  const bool long_enough = calm > kGrace && journal_.now() - waiting.since > kGrace;
+  if (!long_enough || std::exchange(waiting.reported, true)) return;
   const auto now = waiting_.lookup("world", frames_[partition]);
   journal_.violation("a lookup of " + frames_[partition] +
                      " still waits in the calm; one without " +

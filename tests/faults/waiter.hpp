@@ -28,6 +28,7 @@ class Waiter {
  private:
   struct Waiting {
     std::future<Result<StampedTransform>> answer;
+    double since = 0;  // as Journal::now()
     bool reported = false;
   };
 
