@@ -97,7 +97,8 @@ Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
         return fail(Errc::kInvalidInput, element(i, j) + " and " + element(j, i) +
                                              " differ: the covariance is not symmetric");
       }
-      upper[upper_index(i, j)] = 0.5 * (above + below);
+      // The mean, without the sum: that of two finite numbers may be infinite.
+      upper[upper_index(i, j)] = above == below ? above : 0.5 * above + 0.5 * below;
     }
   }
   return from_upper(upper);
@@ -120,7 +121,8 @@ Result<Covariance> Covariance::from_upper(const Upper& upper) {
         return fail(Errc::kInvalidInput, element(i, j) + " is a negative variance");
       }
       if (std::abs(value) > kMaxVariance) {
-        return fail(Errc::kInvalidInput, element(i, j) + " is beyond 1e18");
+        return fail(Errc::kInvalidInput,
+                    element(i, j) + " is " + number(value) + ", which is beyond 1e18");
       }
     }
   }
@@ -137,7 +139,8 @@ Result<Covariance> Covariance::from_stddev(const std::array<double, 6>& stddev) 
       return fail(Errc::kInvalidInput, field + " is not a finite number");
     if (stddev[i] < 0) return fail(Errc::kInvalidInput, field + " is negative");
     if (stddev[i] > std::sqrt(kMaxVariance))
-      return fail(Errc::kInvalidInput, field + " is beyond 1e9");
+      return fail(Errc::kInvalidInput,
+                  field + " is " + number(stddev[i]) + ", which is beyond 1e9");
     upper[upper_index(i, i)] = stddev[i] * stddev[i];
   }
   return trusted(upper);

@@ -36,7 +36,7 @@ tl::unexpected<Error> what_is_wrong(const Eigen::Quaterniond& rotation,
     }
   }
   std::array<char, 32> norm{};
-  std::snprintf(norm.data(), norm.size(), "%g", rotation.norm());
+  std::snprintf(norm.data(), norm.size(), "%g", rotation.coeffs().stableNorm());
   return fail(Errc::kInvalidInput, std::string("rotation has the norm ") + norm.data() +
                                        ", not that of a unit quaternion");
 }

@@ -126,6 +126,8 @@ TEST_CASE("ros poses: a message without a usable covariance is no measurement") 
   CHECK_THAT(why(), ContainsSubstring("has none"));
   message.covariance[0] = -1;
   CHECK_THAT(why(), ContainsSubstring("has none"));
+  message.covariance[0] = std::numeric_limits<double>::max();
+  CHECK_THAT(why(), ContainsSubstring("covariance[") && ContainsSubstring("beyond 1e18"));
   message.covariance[0] = 1;
   message.pose.quat = {};
   CHECK_THAT(why(), ContainsSubstring("quaternion"));

@@ -194,7 +194,27 @@ TEST_CASE("a variance up to 1e18 is accepted") {
   m(2, 2) = 1e18;
   CHECK(refusal(m) == "");
   m(2, 2) = std::nextafter(1e18, kInf);
-  CHECK(refusal(m) == name(2, 2) + " is beyond 1e18");
+  CHECK(refusal(m) == name(2, 2) + " is 1e+18, which is beyond 1e18");
+}
+
+TEST_CASE("the checks of a covariance do not overflow") {
+  // Some programs give the largest number as the variance of an axis of which they know nothing.
+  const double huge = GENERATE(1e154, 1e155, 1e308, std::numeric_limits<double>::max());
+  const int i = GENERATE(range(0, 6));
+  const int j = GENERATE(range(0, 6));
+  CAPTURE(huge, i, j);
+  Matrix6d m = Matrix6d::Identity();
+  m(i, j) = m(j, i) = huge;
+  const std::string place = name(std::min(i, j), std::max(i, j));
+  const std::string said = refusal(m);
+  CHECK(contains(said, place + " is "));
+  CHECK(contains(said, ", which is beyond 1e18"));
+  const auto upper = Covariance::from_upper(Covariance::trusted(m).upper());
+  REQUIRE_FALSE(upper);
+  CHECK(upper.error().message == said);
+  if (i == j) return;
+  m(i, j) = -huge;
+  CHECK(contains(refusal(m), "not symmetric"));
 }
 
 TEST_CASE("a correlation beyond one is rejected") {

@@ -130,6 +130,9 @@ TEST_CASE("point: wrong values are named") {
   negative.covariance(1, 1) = -1;
   CHECK(check_point(negative).error().code == Errc::kInvalidInput);
   CHECK(check_point({{1, 2, 3}, Eigen::Matrix3d::Identity()}).has_value());
+  const double huge = std::numeric_limits<double>::max();
+  CHECK(check_point({{1, 2, 3}, huge * Eigen::Matrix3d::Identity()}).error().message ==
+        "covariance[0][0] is 1.79769e+308, which is beyond 1e18");
 }
 
 }  // namespace

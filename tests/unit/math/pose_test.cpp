@@ -312,8 +312,12 @@ TEST_CASE("create rejects a rotation that is not of unit length") {
   const Quaterniond q = random.pose().rotation();
   for (const double norm : {0.0, 1e-200, 0.5, 0.998, 1.002, 2.0, 1e200}) {
     CAPTURE(norm);
-    CHECK(refusal(Quaterniond(norm * q.coeffs()), Vector3d::Zero()).find("rotation has the norm") ==
-          0);
+    const std::string said = refusal(Quaterniond(norm * q.coeffs()), Vector3d::Zero());
+    CAPTURE(said);
+    CHECK(said.find("rotation has the norm") == 0);
+    // The norm that is shown neither overflows nor vanishes.
+    CHECK(said.find("inf") == std::string::npos);
+    CHECK((said.find("norm 0,") != std::string::npos) == (norm == 0));
   }
 }
 

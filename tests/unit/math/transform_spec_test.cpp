@@ -204,7 +204,7 @@ TEST_CASE("values out of range are rejected by their element") {
   }
   SECTION("standard deviation") {
     spec.stddev = {0, 0, 1.1e9, 0, 0, 0};
-    CHECK(refusal(spec) == "stddev[2] is beyond 1e9");
+    CHECK(refusal(spec) == "stddev[2] is 1.1e+09, which is beyond 1e9");
   }
   SECTION("negative variance") {
     spec.cov = identity_upper();
@@ -214,7 +214,7 @@ TEST_CASE("values out of range are rejected by their element") {
   SECTION("variance") {
     spec.cov = identity_upper();
     (*spec.cov)[upper_index(5, 5)] = 1.1e18;
-    CHECK(refusal(spec) == "covariance[5][5] is beyond 1e18");
+    CHECK(refusal(spec) == "covariance[5][5] is 1.1e+18, which is beyond 1e18");
   }
   SECTION("correlation") {
     spec.cov = identity_upper();
