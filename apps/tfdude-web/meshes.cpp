@@ -11,6 +11,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tfdude/math/pose.hpp"
+
 #include "../tfdude/render.hpp"
 
 namespace tfdude::web {
@@ -28,14 +30,25 @@ std::string attribute(const XMLElement* element, const char* name) {
   return text == nullptr ? std::string() : text;
 }
 
-// Three numbers of an attribute.
-std::array<double, 3> numbers(const XMLElement* element, const char* name, double absent) {
-  std::array<double, 3> values{absent, absent, absent};
+// The numbers of an attribute.
+template <std::size_t N = 3>
+std::array<double, N> numbers(const XMLElement* element, const char* name, double absent) {
+  std::array<double, N> values{};
+  values.fill(absent);
   std::istringstream stream(attribute(element, name));
   for (double& value : values) {
     if (!(stream >> value)) value = absent;
   }
   return values;
+}
+
+// The rotation of an origin, which newer URDFs may give as a quaternion.
+std::array<double, 3> rpy_of(const XMLElement* origin) {
+  const auto [x, y, z, w] = numbers<4>(origin, "quat_xyzw", 0);
+  const Eigen::Quaterniond q(w, x, y, z);
+  if (!(q.norm() > 0)) return numbers(origin, "rpy", 0);
+  const Eigen::Vector3d rpy = to_rpy(q.normalized());
+  return {rpy.x(), rpy.y(), rpy.z()};
 }
 
 std::string ending_of(const fs::path& file) {
@@ -146,7 +159,7 @@ Result<std::vector<std::string>> add_meshes(const std::string& urdf,
         const XMLElement* origin = visual->FirstChildElement("origin");
         (*shape)["link"] = attribute(link, "name");
         (*shape)["xyz"] = numbers(origin, "xyz", 0);
-        (*shape)["rpy"] = numbers(origin, "rpy", 0);
+        (*shape)["rpy"] = rpy_of(origin);
         visuals.push_back(std::move(*shape));
       }
     }

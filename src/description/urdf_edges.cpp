@@ -104,9 +104,10 @@ class EdgeReader {
 Result<void> EdgeReader::read(Index i) {
   const urdf::Joint& urdf = urdf_of(i);
   const urdf::Pose& origin = urdf.parent_to_joint_origin_transform;
+  const urdf::Rotation& q = origin.rotation;
+  const auto rotation = tree_.joints[i].rotation.value_or(Eigen::Quaterniond(q.w, q.x, q.y, q.z));
   const auto pose =
-      Pose::create({origin.rotation.w, origin.rotation.x, origin.rotation.y, origin.rotation.z},
-                   {origin.position.x, origin.position.y, origin.position.z});
+      Pose::create(rotation, {origin.position.x, origin.position.y, origin.position.z});
   if (!pose) return tree_.joint_error(i, "origin: " + pose.error().message);
   edges_[i].X_PJ.pose = *pose;
   const UrdfJoint& said = said_of(i);

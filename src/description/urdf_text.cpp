@@ -4,6 +4,8 @@
 #include <array>
 #include <cctype>
 #include <cstring>
+#include <locale>
+#include <sstream>
 #include <string_view>
 #include <tinyxml2.h>
 
@@ -54,6 +56,28 @@ std::string attribute(const XMLElement& element, const char* name) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == '\t' || c == '\n' || c == '\r'; }, ' ');
   return text;
+}
+
+// 1 or -1 for a text such as "inf", "+INF" or "-infinity", otherwise 0.
+int infinity_of(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(' ');
+  if (begin == std::string::npos) return 0;
+  std::string word = text.substr(begin, text.find_last_not_of(' ') + 1 - begin);
+  const int sign = word[0] == '-' ? -1 : 1;
+  if (word[0] == '-' || word[0] == '+') word.erase(0, 1);
+  std::transform(word.begin(), word.end(), word.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return word == "inf" || word == "infinity" ? sign : 0;
+}
+
+// The quaternion x y z w of an <origin>.
+std::optional<Eigen::Quaterniond> quaternion_of(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  Eigen::Vector4d xyzw;
+  for (double& number : xyzw) stream >> number;
+  if (!stream || !(stream >> std::ws).eof()) return std::nullopt;
+  return Eigen::Quaterniond(xyzw);
 }
 
 std::string described(const char* kind, const std::string& name) {
@@ -112,7 +136,9 @@ class TextReader {
   }
 
   [[nodiscard]] Result<void> joint(const XMLElement& element) {
-    UrdfText::Joint joint{attribute(element, "name"), element.GetLineNum(), {}, {}};
+    UrdfText::Joint joint;
+    joint.name = attribute(element, "name");
+    joint.line = element.GetLineNum();
     if (joint.name.empty()) return error(element, "a joint has no name");
     const std::string what = described("joint", joint.name);
     printer_.OpenElement("joint");
@@ -124,11 +150,10 @@ class TextReader {
       if (const auto* again = part->NextSiblingElement(kept.element)) {
         return error(*again, what + ": <" + kept.element + "> is given twice");
       }
-      // An attribute of later URDF versions. Ignoring it would give the frame a wrong rotation.
-      if (part->Attribute("quat_xyzw") != nullptr) {
-        return error(*part, what + ": quat_xyzw is not known; give rpy");
-      }
       if (auto ok = push_part(*part, kept, what); !ok) return ok;
+      if (kept.element == std::string_view("origin")) {
+        if (auto ok = read_quaternion(*part, what, joint); !ok) return ok;
+      }
       if (kept.element == std::string_view("parent")) joint.parent = attribute(*part, "link");
       if (kept.element == std::string_view("child")) joint.child = attribute(*part, "link");
     }
@@ -139,9 +164,48 @@ class TextReader {
     return {};
   }
 
+  // An attribute of later URDF versions than urdfdom may know.
+  [[nodiscard]] Result<void> read_quaternion(const XMLElement& origin, const std::string& what,
+                                             UrdfText::Joint& joint) const {
+    if (origin.Attribute("quat_xyzw") == nullptr) return {};
+    if (origin.Attribute("rpy") != nullptr) {
+      return error(origin, what + ": rpy and quat_xyzw are both given, one is enough");
+    }
+    const std::string text = attribute(origin, "quat_xyzw");
+    joint.rotation = quaternion_of(text);
+    if (joint.rotation) return {};
+    return error(origin, what + ": quat_xyzw is " + quote(text) + ", which is not four numbers");
+  }
+
+  // A limit that is infinite or not given is none. If only one of them is given, the other one is
+  // zero, as URDF defines it. Without both, URDF would fix the joint at zero, which nobody means.
+  [[nodiscard]] Result<void> push_limits(const XMLElement& limit, const std::string& what) {
+    const bool none = !limit.Attribute("lower") && !limit.Attribute("upper");
+    for (const bool is_lower : {true, false}) {
+      const char* name = is_lower ? "lower" : "upper";
+      const std::string value = attribute(limit, name);
+      const int infinity = infinity_of(value);
+      if (infinity == (is_lower ? 1 : -1)) {
+        return error(limit, what + ": " + name + " is " + quote(value) +
+                                ": no position is within the limits");
+      }
+      if (none || infinity != 0) {
+        // urdfdom cannot read infinity. This is beyond every valid position.
+        printer_.PushAttribute(name, is_lower ? "-1e300" : "1e300");
+      } else {
+        push(limit, name);
+      }
+    }
+    // urdfdom requires these attributes.
+    printer_.PushAttribute("effort", "0");
+    printer_.PushAttribute("velocity", "0");
+    return {};
+  }
+
   [[nodiscard]] Result<void> push_part(const XMLElement& part, const Kept& kept,
                                        const std::string& what) {
     printer_.OpenElement(kept.element);
+    const bool limits = kept.element == std::string_view("limit");
     for (const char* name : kept.attributes) {
       // urdfdom logs a bad number as a format of printf, so it must contain no percent sign.
       const std::string value = attribute(part, name);
@@ -149,12 +213,10 @@ class TextReader {
       if (!names && value.find('%') != std::string::npos) {
         return error(part, what + ": " + name + " is " + quote(value) + ", which is no number");
       }
-      push(part, name);
+      if (!limits) push(part, name);
     }
-    if (kept.element == std::string_view("limit")) {
-      // urdfdom requires these attributes.
-      printer_.PushAttribute("effort", "0");
-      printer_.PushAttribute("velocity", "0");
+    if (limits) {
+      if (auto ok = push_limits(part, what); !ok) return ok;
     }
     printer_.CloseElement();
     return {};

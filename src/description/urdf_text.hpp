@@ -1,7 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "tfdude/base/result.hpp"
 
@@ -18,6 +21,8 @@ struct UrdfText {
     int line = 0;
     std::string parent;
     std::string child;
+    /// That of the origin, if it is given as a quaternion; of any length.
+    std::optional<Eigen::Quaterniond> rotation;
   };
 
   std::vector<Link> links;
@@ -32,7 +37,8 @@ struct UrdfText {
 
 /// @param file  for messages
 /// @return kConfig naming file and line: not XML, not a URDF, or a file for xacro; kInvalidInput: a
-/// link or joint without a name, a joint without its links, a duplicate element.
+/// link or joint without a name, a joint without its links, a duplicate element, a limit or a
+/// quaternion that is none.
 [[nodiscard]] Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file);
 
 }  // namespace tfdude

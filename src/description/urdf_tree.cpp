@@ -41,7 +41,7 @@ Result<std::size_t> end_of(const UrdfTree& tree, std::size_t joint, const char* 
 
 Result<void> join(UrdfTree& tree, const UrdfText::Joint& said) {
   const std::size_t index = tree.joints.size();
-  tree.joints.push_back({said.name, said.line, 0, 0});
+  tree.joints.push_back({said.name, said.line, 0, 0, said.rotation});
   const auto [known, fresh] = tree.joint_index.emplace(said.name, index);
   if (!fresh) return taken(tree, "joint", said.name, said.line, tree.joints[known->second].line);
   const auto parent = end_of(tree, index, "parent", said.parent);

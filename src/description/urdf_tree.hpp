@@ -23,6 +23,7 @@ struct UrdfTree {
     int line = 0;
     std::size_t parent = 0;
     std::size_t child = 0;
+    std::optional<Eigen::Quaterniond> rotation{};  ///< as UrdfText::Joint::rotation
   };
 
   std::string file;

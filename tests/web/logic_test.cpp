@@ -1,6 +1,7 @@
 // What decides in tfdude-web, without a network: who may connect, what clients may ask for, what is
 // kept of the values, and the layout of the messages.
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -209,8 +210,8 @@ TEST_CASE("web: only meshes that a URDF names are served, and only from below it
       "robot.urdf", "<robot name='r'>" + link("package://arm/meshes/link.STL") + link(secret) +
                         link("package://arm/meshes/linked.stl") +
                         link("package://arm/../../../" + secret) + link("package://") +
-                        "<link name='b'><visual><geometry><sphere radius='0.5'/></geometry>"
-                        "</visual></link></robot>");
+                        "<link name='b'><visual><origin quat_xyzw='1 0 0 0'/><geometry>"
+                        "<sphere radius='0.5'/></geometry></visual></link></robot>");
   Files files;
   const auto left_out = add_meshes(urdf, {packages}, files);
   REQUIRE(left_out);
@@ -219,6 +220,7 @@ TEST_CASE("web: only meshes that a URDF names are served, and only from below it
   REQUIRE(robot.at("visuals").size() == 2);
   CHECK(robot["visuals"][0]["xyz"] == nlohmann::json({1, 2, 3}));
   CHECK(robot["visuals"][1]["sphere"] == 0.5);
+  CHECK(std::abs(robot["visuals"][1]["rpy"][0].get<double>()) == testing::Approx(std::acos(-1.0)));
   CHECK(*files.get(robot["visuals"][0]["mesh"].get<std::string>()).body == "solid x");
   CHECK(files.get("/mesh/1.stl").status == 404);
   CHECK_FALSE(add_meshes(folder.path() + "/none.urdf", {}, files));

@@ -170,8 +170,29 @@ TEST_CASE("urdf: links and joints that form no tree are rejected") {
                 joint("k", "fixed", "b", "a")),
           "r.urdf:6: joint 'k': parent link 'b' is the child link itself or lies below it");
   refused(pair("fixed", "<origin/><origin/>"), "r.urdf:4: joint 'j': <origin> is given twice");
-  refused(pair("fixed", "<origin quat_xyzw=\"0 0 0 1\"/>"),
-          "r.urdf:4: joint 'j': quat_xyzw is not known; give rpy");
+}
+
+TEST_CASE("urdf: the rotation of an origin may be a quaternion") {
+  const auto origin = [](const std::string& attributes) {
+    return frames_of(pair("revolute", "<origin " + attributes + "/>" + limits("-1", "1")))[1].X_PC;
+  };
+  const auto turned = origin("xyz=\"1 2 3\" quat_xyzw=\" 0.5 -0.5 0.5\t0.5 \"").pose;
+  CHECK(turned.translation() == Eigen::Vector3d(1, 2, 3));
+  CHECK(turned.rotation().coeffs() == Eigen::Vector4d(0.5, -0.5, 0.5, 0.5));
+  const auto same = origin("rpy=\"0 0 0.3\"").pose;
+  const auto quaternion = origin("quat_xyzw=\"0 0 0.149438 0.988771\"").pose;
+  CHECK(same.rotation().angularDistance(quaternion.rotation()) < 1e-6);
+  const auto fixed = frames_of(pair("fixed", "<origin quat_xyzw=\"1 0 0 0\"/>"))[1].X_PC.pose;
+  CHECK(fixed.rotation().coeffs() == Eigen::Vector4d(1, 0, 0, 0));
+  const std::string place = "r.urdf:4: joint 'j': ";
+  refused(pair("fixed", "<origin rpy=\"0 0 0\" quat_xyzw=\"0 0 0 1\"/>"),
+          place + "rpy and quat_xyzw are both given, one is enough");
+  for (const std::string bad : {"", "0 0 1", "0 0 0 1 0", "0 0 0 one", "0 0 0 1%s", "nan 0 0 1"}) {
+    refused(pair("fixed", "<origin quat_xyzw=\"" + bad + "\"/>"),
+            place + "quat_xyzw is '" + bad + "', which is not four numbers");
+  }
+  refused(pair("fixed", "<origin quat_xyzw=\"0 0 0 2\"/>"),
+          place + "origin: rotation has the norm 2, not that of a unit quaternion");
 }
 
 TEST_CASE("urdf: invalid values of joints are rejected") {
@@ -211,6 +232,44 @@ TEST_CASE("urdf: a limit that no position can reach is ignored") {
   CHECK(half.limits->contain(1e9));
   CHECK(half.position == 0.5);
   CHECK(*half.variance == Approx(M_PI * M_PI / 3));
+}
+
+TEST_CASE("urdf: an infinite limit is none") {
+  const std::string type = GENERATE("revolute", "prismatic");
+  CAPTURE(type);
+  const auto joint = [&](const std::string& limit) {
+    return *frames_of(pair(type, limit)).back().joint;
+  };
+  for (const std::string word : {"inf", "INF", "Infinity", " inf "}) {
+    CAPTURE(word);
+    CHECK_FALSE(joint(limits("-" + word.substr(word.find_first_not_of(' ')), word)).limits);
+    CHECK(joint(limits("0.5", word)).limits->lower == 0.5);
+    CHECK(joint(limits("0.5", word)).limits->contain(1e9));
+  }
+  CHECK(joint(limits("-inf", "+inf")).variance.has_value() == (type == "revolute"));
+  CHECK(joint(limits("-inf", "2")).limits->upper == 2);
+  CHECK(joint(limits("-inf", "2")).limits->contain(-1e9));
+  const std::string place = "r.urdf:4: joint 'j': ";
+  refused(pair(type, limits("inf", "inf")),
+          place + "lower is 'inf': no position is within the limits");
+  refused(pair(type, limits("-inf", "-Inf")),
+          place + "upper is '-Inf': no position is within the limits");
+}
+
+TEST_CASE("urdf: limits of effort and velocity alone leave the position free") {
+  const std::string type = GENERATE("revolute", "prismatic");
+  CAPTURE(type);
+  const auto joint = [&](const std::string& limit) {
+    return *frames_of(pair(type, limit), with_joint("j", {0.7, {}, {}})).back().joint;
+  };
+  CHECK_FALSE(joint("<limit effort=\"10\" velocity=\"1\"/>").limits);
+  CHECK_FALSE(joint("<limit/>").limits);
+  CHECK(joint("<limit effort=\"inf\"/>").position == 0.7);
+  // URDF: a limit that is not given is zero.
+  const auto one = joint("<limit upper=\"2\"/>");
+  REQUIRE(one.limits);
+  CHECK(one.limits->lower == 0);
+  CHECK(one.limits->upper == 2);
 }
 
 TEST_CASE("urdf: a joint has its given or default position before its first sample") {
