@@ -4,6 +4,8 @@
 #include <set>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 namespace tfdude::cli {
 namespace {
 
@@ -17,6 +19,15 @@ Correlation replayed(Correlation correlation) {
     error.source = std::string(kReplayedPrefix) + error.source.substr(kObservedPrefix.size());
   }
   return correlation;
+}
+
+// A process of an earlier version may have had an id that no new frame gets.
+bool can_serve(const FrameSpec& spec) {
+  const auto& sources = spec.correlation.common_errors;
+  return check_new_id(spec.id, "id") &&
+         std::all_of(sources.begin(), sources.end(), [](const CommonError& one) {
+           return check_new_id(one.source, "source").has_value();
+         });
 }
 
 // The values by frame.
@@ -34,6 +45,7 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
                                                   const ValuesNews& values,
                                                   const Options& options) {
   std::vector<FrameSpec> specs;
+  std::size_t rejected = 0;
   std::unordered_map<std::string, Edge> served;
   const auto known = by_frame(frames.frames.size(), values);
   for (std::size_t i = 0; i < known.size(); ++i) {
@@ -49,6 +61,10 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
         spec.timing->process_noise = *known[i]->begins;
       }
     }
+    if (!can_serve(spec)) {
+      ++rejected;
+      continue;
+    }
     specs.push_back(std::move(spec));
     served.emplace(frame.id, std::move(edge));
   }
@@ -56,6 +72,7 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
   if (!node) return tl::unexpected(std::move(node.error()));
   ReplayedPartition partition(*std::move(node));
   partition.frames_ = frames.frames;
+  partition.rejected_ = rejected;
   partition.served_ = std::move(served);
   if (auto taken = partition.take(values); !taken) return tl::unexpected(std::move(taken.error()));
   return partition;

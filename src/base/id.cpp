@@ -1,7 +1,9 @@
 #include "tfdude/base/id.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <cstdio>
 
 namespace tfdude {
 namespace {
@@ -35,6 +37,33 @@ bool is_plain(std::string_view text) {
 
 bool is_control(std::uint32_t value) { return value < 0x20 || (value >= 0x7F && value < 0xA0); }
 
+struct Range {
+  std::uint32_t first;
+  std::uint32_t last;
+};
+
+// Those that look like a space, or cannot be seen at all, in the order of their numbers: Unicode's
+// White_Space beyond ASCII, Default_Ignorable_Code_Point, and the blank pattern of Braille.
+constexpr std::array<Range, 21> kUnseen = {
+    {{0xA0, 0xA0},      {0xAD, 0xAD},     {0x34F, 0x34F},   {0x61C, 0x61C},     {0x115F, 0x1160},
+     {0x1680, 0x1680},  {0x17B4, 0x17B5}, {0x180B, 0x180F}, {0x2000, 0x200F},   {0x2028, 0x202F},
+     {0x205F, 0x206F},  {0x2800, 0x2800}, {0x3000, 0x3000}, {0x3164, 0x3164},   {0xFE00, 0xFE0F},
+     {0xFEFF, 0xFEFF},  {0xFFA0, 0xFFA0}, {0xFFF0, 0xFFFB}, {0x1BCA0, 0x1BCA3}, {0x1D173, 0x1D17A},
+     {0xE0000, 0xE0FFF}}};
+
+bool is_unseen(std::uint32_t value) {
+  return value >= kUnseen.front().first &&
+         std::any_of(kUnseen.begin(), kUnseen.end(), [value](const Range& range) {
+           return range.first <= value && value <= range.last;
+         });
+}
+
+std::string code_point(std::uint32_t value) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), "U+%04X", static_cast<unsigned>(value));
+  return text.data();
+}
+
 }  // namespace
 
 Result<void> check_id(std::string_view id, std::string_view what) {
@@ -60,6 +89,25 @@ Result<void> check_id(std::string_view id, std::string_view what) {
   return {};
 }
 
+Result<void> check_new_id(std::string_view id, std::string_view what) {
+  if (auto ok = check_id(id, what); !ok) return ok;
+  const std::string_view where = id.front() == ' '  ? " begins with a space"
+                                 : id.back() == ' ' ? " ends with a space"
+                                                    : "";
+  if (where.empty() && is_plain(id)) return {};
+  const std::string who = std::string(what) + " " + quote(id);
+  if (!where.empty()) return fail(Errc::kInvalidInput, who + std::string(where));
+  for (std::size_t i = 0; i < id.size();) {
+    const CodePoint point = decode(id.substr(i));
+    if (is_unseen(point.value)) {
+      return fail(Errc::kInvalidInput, who + " holds the character " + code_point(point.value) +
+                                           ", which cannot be seen or looks like a space");
+    }
+    i += point.bytes;
+  }
+  return {};
+}
+
 Result<void> check_partition_name(std::string_view name) {
   if (auto ok = check_id(name, "partition"); !ok) return ok;
   if (const auto at = name.find_first_of("*?[],"); at != std::string_view::npos) {
@@ -69,22 +117,29 @@ Result<void> check_partition_name(std::string_view name) {
   return {};
 }
 
+Result<void> check_new_partition_name(std::string_view name) {
+  return check_partition_name(name).and_then([&] { return check_new_id(name, "partition"); });
+}
+
 std::string printable(std::string_view text) {
   if (is_plain(text)) return std::string(text);  // errors about frames are part of usual lookups
   constexpr std::string_view kHexDigits = "0123456789abcdef";
   std::string out;
   for (std::size_t i = 0; i < text.size();) {
     const CodePoint point = decode(text.substr(i));
-    if (point.bytes == 0 || is_control(point.value)) {
-      const auto byte = static_cast<std::uint8_t>(text[i]);
-      out += "\\x";
-      out += kHexDigits[byte >> 4U];
-      out += kHexDigits[byte & 0xFU];
-      ++i;
-    } else {
-      out += text.substr(i, point.bytes);
-      i += point.bytes;
+    const std::size_t bytes = std::max<std::size_t>(point.bytes, 1);
+    const bool shown = point.bytes != 0 && !is_control(point.value) && !is_unseen(point.value);
+    for (const char c : text.substr(i, bytes)) {
+      const auto byte = static_cast<std::uint8_t>(c);
+      if (shown) {
+        out += c;
+      } else {
+        out += "\\x";
+        out += kHexDigits[byte >> 4U];
+        out += kHexDigits[byte & 0xFU];
+      }
     }
+    i += bytes;
   }
   return out;
 }

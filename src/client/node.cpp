@@ -9,7 +9,7 @@ namespace tfdude {
 namespace {
 
 Result<void> check(const std::string& partition, const Options& options) {
-  if (!options.follow) return check_partition_name(partition);
+  if (!options.follow) return check_new_partition_name(partition);
   return fail(Errc::kInvalidInput,
               "follow: partition " + quote(partition) + " needs all frames, not only some");
 }

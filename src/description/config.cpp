@@ -134,7 +134,9 @@ Result<CommonError> Reader::common_error(const std::string& source, const Field&
       common_error.loading(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
     }
   }
-  if (auto ok = check_common_errors({common_error}); !ok) {
+  auto ok =
+      check_common_errors({common_error}).and_then([&] { return check_new_id(source, "source"); });
+  if (!ok) {
     return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
   }
   if (!is_observed(common_error)) return common_error;
@@ -214,7 +216,7 @@ Result<Config> Reader::config(const YAML::Node& root) const {
   if (const auto found = entries->find("partition"); found != entries->end()) {
     auto name = text(found->second, "partition");
     if (!name) return tl::unexpected(name.error());
-    if (const auto ok = check_partition_name(*name); !ok) {
+    if (const auto ok = check_new_partition_name(*name); !ok) {
       return error(ok.error().code, found->second.mark, ok.error().message);
     }
     config.partition = *std::move(name);

@@ -25,7 +25,7 @@ tl::unexpected<Error> link_error(const UrdfTree& tree, const UrdfTree::Link& lin
 Result<void> check_root(const UrdfTree& tree, const UrdfPart& part,
                         const std::vector<std::size_t>& links) {
   if (part.root.empty()) return {};
-  if (auto ok = check_id(part.root, "root"); !ok) return fail_at(tree.file, ok.error());
+  if (auto ok = check_new_id(part.root, "root"); !ok) return fail_at(tree.file, ok.error());
   if (std::find(links.begin(), links.end(), tree.root) == links.end()) {
     return fail(Errc::kInvalidInput, tree.file + ": root " + quote(part.root) +
                                          " is given, but the part is without the root link " +
@@ -41,7 +41,7 @@ Result<FrameSpec> frame(const UrdfTree& tree, const UrdfTree::Link& link,
                         const std::vector<UrdfEdge>& edges, const UrdfPart& part) {
   FrameSpec spec;
   spec.id = part.prefix + link.name;
-  if (auto ok = check_id(spec.id, "name"); !ok) return link_error(tree, link, ok.error().message);
+  if (auto ok = check_new_id(spec.id, "name"); !ok) return link_error(tree, link, ok.error().message);
   if (!link.joint) {
     spec.parent = part.root;
     if (!part.root.empty()) spec.X_PC = part.X_root;

@@ -140,7 +140,7 @@ Result<std::string> YamlFields::id(const Fields& fields, std::string_view key,
   const Field& field = fields.find(key)->second;
   auto value = text(field, place + ": " + std::string(key));
   if (!value) return value;
-  if (const auto ok = check_id(*value, key); !ok) {
+  if (const auto ok = check_new_id(*value, key); !ok) {
     return error(ok.error().code, field.mark, place + ": " + ok.error().message);
   }
   return value;

@@ -45,6 +45,13 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
 Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time) {
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
+    auto ok = check_new_id(frame.id, "id");
+    for (const CommonError& one : frame.correlation.common_errors) {
+      if (ok) ok = check_new_id(one.source, "source");
+    }
+    if (!ok) return ok;
+  }
+  for (const FrameSpec& frame : frames) {
     // Frames of a partition that is gone may be taken.
     (void)directory_.take(frame.id);
     auto added = forest_.add(frame.id, frame.parent, value_of(frame), Forest::MissingParent::kAllow,
@@ -175,6 +182,7 @@ Result<void> Partition::add(const std::string& id, const AddRequest& request, Ti
   if (frame_count() >= max_frames_) {
     ++refused_frames_;
     return fail(Errc::kTooMuch, "frame " + quote(id) + " is not added: partition " + quote(name_) +
+  if (auto ok = check_new_id(id, "id"); !ok) return ok;
                                     " has " + std::to_string(frame_count()) + " frames, its limit");
   }
   directory_.saw_lamport_time(request.lamport_time);
@@ -303,6 +311,9 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
   if (joints_.is_coupled(id)) {
     return fail(Errc::kInvalidInput, who +
                                          " is moved by a joint that others mimic; its correlation "
+  for (const CommonError& one : correlation.common_errors) {
+    if (auto ok = check_new_id(one.source, "source"); !ok) return fail_at(who, ok.error());
+  }
                                          "cannot be set");
   }
   if (auto said = forest_.correlate(id, correlation); !said) {

@@ -94,7 +94,7 @@ Result<Part> route_to(const Directory& directory, Owner owner, Request request) 
 
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
-  if (auto ok = check_id(id, "id"); !ok) return tl::unexpected(ok.error());
+  if (auto ok = check_new_id(id, "id"); !ok) return tl::unexpected(ok.error());
   if (auto ok = check_value(id, request.X_PC); !ok) return tl::unexpected(ok.error());
   if (forest.exists(id))
     return fail(Errc::kAlreadyExists, "frame " + quote(id) + " exists already");

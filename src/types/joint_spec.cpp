@@ -38,7 +38,7 @@ Result<void> check_value(const JointValue& joint) {
 
 Result<void> check_joint(const JointSpec& joint) {
   const std::string who = "joint " + quote(joint.name);
-  if (auto ok = check_id(joint.name, "joint"); !ok) return ok;
+  if (auto ok = check_new_id(joint.name, "joint"); !ok) return ok;
   const auto bad = [&](const char* what) { return fail(Errc::kInvalidInput, who + ": " + what); };
   if (joint.mimic && !joint.coupled) return bad("follows another, so it is coupled");
   if (joint.coupled && !check_id(shared_source(leader_of(joint)), "source")) {

@@ -209,7 +209,7 @@ Result<void> Reader::description_in(const YAML::Node& node, Settings& settings) 
   const auto X_root = transform(node, *entries, "description_in", {});
   if (!X_root) return tl::unexpected(X_root.error());
   in.part.X_root = *X_root;
-  if (const auto name = check_partition_name(in.partition); !name) {
+  if (const auto name = check_new_partition_name(in.partition); !name) {
     return error(name.error().code, node.Mark(), "description_in: " + name.error().message);
   }
   if (!fixed.empty()) {

@@ -47,7 +47,7 @@ Result<std::string> id_of(std::string_view ros_name, const std::string& prefix) 
   const std::string_view name = without_slashes(ros_name);
   std::string id = name.empty() ? std::string() : prefix + std::string(name);
   constexpr std::size_t kShown = 60;
-  if (auto ok = check_id(id, "id"); !ok) {
+  if (auto ok = check_new_id(id, "id"); !ok) {
     return fail_at("frame " + quote(ros_name.substr(0, kShown)), ok.error());
   }
   return id;

@@ -40,7 +40,7 @@ struct Choice {
 [[nodiscard]] std::string_view without_slashes(std::string_view name);
 
 /// The id of a frame of ROS: without leading slashes, with the prefix.
-/// @return kInvalidInput naming the frame: as check_id().
+/// @return kInvalidInput naming the frame: as check_new_id().
 [[nodiscard]] Result<std::string> id_of(std::string_view ros_name, const std::string& prefix);
 
 /// The inverse. @return none for a frame without the prefix: it has no name in ROS

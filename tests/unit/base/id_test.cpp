@@ -89,6 +89,40 @@ TEST_CASE("a rejection shows the bytes escaped and names the field") {
   CHECK(refusal("a\nz") == "child 'a\\x0az' holds a control character");
 }
 
+TEST_CASE("a new id does not look like another one") {
+  const auto said = [](std::string_view id) {
+    const auto ok = check_new_id(id, "id");
+    return ok ? std::string() : ok.error().message;
+  };
+  for (const char* good : {"a", "left hand", "a  b", "\xC3\xA9tage 2", "\xE5\xB7\xA6", "a/b"}) {
+    CHECK(said(good).empty());
+  }
+  CHECK(said("") == "id is empty");
+  CHECK(said(" ") == "id ' ' begins with a space");
+  CHECK(said(" a") == "id ' a' begins with a space");
+  CHECK(said("a ") == "id 'a ' ends with a space");
+  CHECK(contains(said("a\t"), "control character"));
+  // No-break, narrow, ideographic and zero-width spaces, a joiner, marks of direction, a soft
+  // hyphen, a filler, a variation selector, a tag.
+  const std::string unseen = GENERATE(as<std::string>{}, "\xC2\xA0", "\xE2\x80\xAF", "\xE3\x80\x80",
+                                      "\xE2\x80\x8B", "\xE2\x80\x8D", "\xE2\x80\xAE", "\xC2\xAD",
+                                      "\xE3\x85\xA4", "\xEF\xB8\x8F", "\xF3\xA0\x80\x81");
+  CAPTURE(unseen);
+  for (const std::string& id : {unseen, "a" + unseen, unseen + "a", "a" + unseen + "b"}) {
+    CHECK(contains(said(id), "cannot be seen or looks like a space"));
+    // One that exists already is still an id, and is shown without doubt.
+    CHECK(refusal(id).empty());
+    CHECK(contains(quote(id), "\\x"));
+    CHECK_FALSE(check_new_partition_name(id));
+  }
+  CHECK(said("a\xE2\x80\x8B") ==
+        "id 'a\\xe2\\x80\\x8b' holds the character U+200B, which cannot be seen or looks like a "
+        "space");
+  CHECK(check_new_partition_name("left arm"));
+  CHECK_FALSE(check_new_partition_name("arm "));
+  CHECK_FALSE(check_new_partition_name("arm*"));
+}
+
 TEST_CASE("a partition name is an id") {
   CHECK(check_partition_name("robot_1"));
   CHECK(check_partition_name("\xC3\xA9tage 2"));

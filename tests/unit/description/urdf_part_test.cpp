@@ -15,6 +15,7 @@ using tfdude::testing::frames_of;
 using tfdude::testing::hand;
 using tfdude::testing::ids_of;
 using tfdude::testing::joint;
+using tfdude::testing::limits;
 using tfdude::testing::link;
 using tfdude::testing::refused;
 using tfdude::testing::robot;
@@ -121,6 +122,17 @@ TEST_CASE("urdf: the prefix is added to the names of links and joints") {
       robot(link("a") + link("b") + joint("abcdef", "continuous", "a", "b")), part,
       "r.urdf:4: joint 'abcdef': name '" + start + "'... has 256 bytes, at most 255 are allowed");
   CHECK(frames_of(robot(link("abcde")), part).size() == 1);
+}
+
+TEST_CASE("urdf: names of links and joints may have spaces within them only") {
+  const auto with_names = [](const std::string& link_name, const std::string& joint_name) {
+    return robot(link("a") + link(link_name) +
+                 joint(joint_name, "revolute", "a", link_name, limits("-1", "1")));
+  };
+  CHECK(ids_of(frames_of(with_names("left hand", "left wrist"))) == "a left hand");
+  refused(with_names("hand ", "wrist"), "r.urdf:3: link 'hand ': name 'hand ' ends with a space");
+  refused(with_names("hand", " wrist"),
+          "r.urdf:4: joint ' wrist': name ' wrist' begins with a space");
 }
 
 TEST_CASE("urdf: the root link is attached to the given frame") {

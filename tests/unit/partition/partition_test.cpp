@@ -79,6 +79,7 @@ TEST_CASE("a configuration with a bad frame is rejected as a whole and the frame
       {{{"a", "", {}}, {"base", "", {}}}, "already_exists", "'base'"},
       {{{"a", "", {}}, {"b\n", "a", {}}}, "invalid_input", "id"},
       {{{"a", "", {}}, {"", "a", {}}}, "invalid_input", "id"},
+      {{{"a", "", {}}, {"a ", "a", {}}}, "invalid_input", "id 'a ' ends with a space"},
       {{{"a", "", {}}, {"b", std::string(256, 'p'), {}}}, "invalid_input", "parent"},
       {{{"a", "b", {}}, {"b", "a", {}}}, "cycle", "'b'"},
       {{{"b", "a", {}}, {"a", "a", {}}}, "cycle", "'a'"},
@@ -135,6 +136,8 @@ TEST_CASE("an add is rejected with the frame and the reason") {
   CHECK(said(arms.ask("finger", AddRequest{"fist", {}})) ==
         "unknown_parent: no frame 'fist' to be the parent of 'finger'");
   CHECK(said(arms.ask("\x7f", AddRequest{"arm", {}})).rfind("invalid_input: id", 0) == 0);
+  CHECK(said(arms.ask("hand ", AddRequest{"arm", {}})) ==
+        "invalid_input: id 'hand ' ends with a space");
   CHECK(said(arms.ask("a", AddRequest{"\n", {}})).rfind("invalid_input: parent", 0) == 0);
   CHECK(arms.structure() == before);
   CHECK(arms.partition.take_pages().empty());

@@ -227,5 +227,19 @@ TEST_CASE("a frame that a deleted entry orphans is reported once") {
   CHECK(heard == Lines{"frame_removed hand", "frame_orphaned tool"});
 }
 
+TEST_CASE("a stored frame keeps an id that no new frame gets") {
+  MemoryStore store;
+  StateChange former;
+  former.frames = {{"arm ", "", along_x(1), 1, {}}, {"hand", "arm ", along_x(2), 1, {}}};
+  REQUIRE(store.save(former));
+  Life life(store, {}, 1);
+  CHECK(x_of(life.forest.lookup("arm ", "hand")) == 2);
+  Replica other;
+  life.tell(other, 1);
+  CHECK(other.forest.exists("arm "));
+  life.ask("arm ", RemoveRequest{{"arm "}});
+  CHECK_FALSE(life.forest.exists("arm "));
+}
+
 }  // namespace
 }  // namespace tfdude
