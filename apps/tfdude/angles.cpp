@@ -4,9 +4,7 @@ namespace tfdude::cli {
 
 std::string angles_text(double x, double y, double z, const AngleUnit& unit, const char* suffix) {
   const auto one = [&](double angle) {
-    const std::string text = format("%.*f", unit.decimals, angle * unit.per_radian);
-    return text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos ? text.substr(1)
-                                                                                : text;
+    return format("%.*f", unit.decimals, angle * unit.per_radian);
   };
   return one(x) + "  " + one(y) + "  " + one(z) + "  " + unit.name + suffix;
 }

@@ -145,11 +145,6 @@ std::string unspecified_text(const std::vector<std::string>& edges) {
 
 namespace {
 
-// Zero for what is printed as zero: rounding errors would otherwise make some of them -0.000000.
-double shown_as(double value, double last_digit) {
-  return std::abs(value) < last_digit / 2 ? 0.0 : value;
-}
-
 std::string describe_pose(const Pose& X_AB, const Shown& shown) {
   std::string text;
   if (shown.matrix) {
@@ -157,16 +152,15 @@ std::string describe_pose(const Pose& X_AB, const Shown& shown) {
     for (int row = 0; row < 4; ++row) {
       text += row == 0 ? "matrix     " : "           ";
       for (int column = 0; column < 4; ++column) {
-        text += format(" % .9f", shown_as(matrix(row, column), 1e-9));
+        text += format(" % .9f", matrix(row, column));
       }
       text += "\n";
     }
     return text;
   }
-  const auto six_digits = [](double value) { return shown_as(value, 1e-6); };
-  const Eigen::Vector3d t = X_AB.translation().unaryExpr(six_digits);
-  const Eigen::Vector4d q = X_AB.rotation().coeffs().unaryExpr(six_digits);
-  const Eigen::Vector3d rpy = to_rpy(X_AB.rotation()).unaryExpr(six_digits);
+  const Eigen::Vector3d t = X_AB.translation();
+  const Eigen::Vector4d q = X_AB.rotation().coeffs();
+  const Eigen::Vector3d rpy = to_rpy(X_AB.rotation());
   text = format("translation  %.6f  %.6f  %.6f  m\n", t.x(), t.y(), t.z());
   text += format("quaternion   %.6f  %.6f  %.6f  %.6f  (x y z w)\n", q[0], q[1], q[2], q[3]);
   return text + "rpy          " + angles_text(rpy.x(), rpy.y(), rpy.z(), shown.angles) + "\n";
@@ -249,7 +243,15 @@ nlohmann::json change_json(const Change& change) {
   return json;
 }
 
-std::string dump(const nlohmann::json& json) {
+// Zero has no sign, for programs that compare texts.
+void without_signed_zeros(nlohmann::json& json) {
+  if (json.is_number_float() && json.get<double>() == 0) json = 0.0;
+  if (!json.is_structured()) return;
+  for (nlohmann::json& part : json) without_signed_zeros(part);
+}
+
+std::string dump(nlohmann::json json) {
+  without_signed_zeros(json);
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

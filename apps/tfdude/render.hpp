@@ -59,7 +59,7 @@ void add_covariance(nlohmann::json& json, const std::string& key, const Eigen::M
 [[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);
 [[nodiscard]] nlohmann::json change_json(const Change& change);
 
-/// One line of JSON; invalid UTF-8 is replaced.
-[[nodiscard]] std::string dump(const nlohmann::json& json);
+/// One line of JSON; invalid UTF-8 is replaced, and no zero has a sign.
+[[nodiscard]] std::string dump(nlohmann::json json);
 
 }  // namespace tfdude::cli

@@ -14,7 +14,7 @@ std::string number(double value) {
   std::string text = format("%.2f", value);
   text.erase(text.find_last_not_of('0') + 1);
   if (text.back() == '.') text.pop_back();
-  return text == "-0" ? "0" : text;
+  return text;
 }
 
 std::string pair(Point point) { return number(point.x) + " " + number(point.y); }

@@ -46,7 +46,7 @@ std::string text_of(const Transform& X, const std::string& name) {
   const auto list = [&](std::initializer_list<double> values) {
     const char* before = "[";
     for (const double value : values) {
-      text << before << value;
+      text << before << value + 0.0;  // no zero has a sign
       before = ", ";
     }
     text << "]";

@@ -225,6 +225,7 @@ def test_equality_and_text():
     )
     assert eval(repr(X), {"Transform": Transform}) == X
     assert "covariance='unspecified'" in repr(Transform())
+    assert "-0" not in repr(Transform([-0.0, 0, 1], [0, -0.0, 0, 1]))
     assert X.with_covariance(None) == Transform((1, 2, 3))
 
 

@@ -2,7 +2,7 @@
 import { UNSPECIFIED } from './model.js';
 import { Plot } from './plot.js';
 import { eigen, rotation, toRpy } from './spatial.js';
-import { clock, degrees, element, metres, seconds } from './text.js';
+import { clock, degrees, element, fixed, metres, seconds } from './text.js';
 
 const NAMES = ['x', 'y', 'z', 'roll', 'pitch', 'yaw'];
 // Of a normal distribution in three dimensions.
@@ -102,8 +102,8 @@ export class Inspector {
       onclick: () => { this.plot.component = i; this.draw(); },
     },
     element('th', { class: i < 3 ? name : '' }, name),
-    element('td', {}, i < 3 ? `${answer.translation[i].toFixed(6)} m`
-      : `${((rpy[i - 3] * 180) / Math.PI).toFixed(4)}°`),
+    element('td', {}, i < 3 ? `${fixed(answer.translation[i], 6)} m`
+      : `${fixed((rpy[i - 3] * 180) / Math.PI, 4)}°`),
     element('td', { class: 's' }, s ? `± ${i < 3 ? metres(s[i]) : degrees(s[i])}` : '')));
     const notes = [];
     const { basis } = answer;
@@ -116,7 +116,7 @@ export class Inspector {
     const copy = element('button', { class: 'copy', title: 'Copy as JSON',
       onclick: () => navigator.clipboard.writeText(JSON.stringify(answer)) }, 'copy');
     return [element('h2', {}, 'B in A', copy), element('table', { class: 'pose' }, element('tbody', {}, ...rows)),
-      element('p', { class: 'note', title: 'x, y, z, w' }, `quaternion ${q.map((c) => c.toFixed(6)).join('  ')}`),
+      element('p', { class: 'note', title: 'x, y, z, w' }, `quaternion ${q.map((c) => fixed(c, 6)).join('  ')}`),
       element('p', { class: 'note' }, this.instant(answer)), ...notes];
   }
 
@@ -147,7 +147,7 @@ export class Inspector {
     return [element('h2', {}, `Ellipsoid · ${title}`),
       element('div', { class: 'bars' }, ...values.map((value, i) => element('div', {},
         element('span', { class: 'name', title: 'direction in A' },
-          `along ${vectors[i].map((c) => c.toFixed(2)).join(' ')}`),
+          `along ${vectors[i].map((c) => fixed(c, 2)).join(' ')}`),
         element('span', { class: 'bar' }, element('i', { style: `width:${(100 * Math.sqrt(value)) / most}%` })),
         element('span', { class: 'n' }, metres(this.k * Math.sqrt(value))))))];
   }

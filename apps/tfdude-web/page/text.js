@@ -12,6 +12,12 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
+/** With so many decimals; no zero has a sign. */
+export function fixed(x, decimals) {
+  const text = x.toFixed(decimals);
+  return Number(text) === 0 ? text.replace('-', '') : text;
+}
+
 /** A length: "1.2 mm", "3.40 m". */
 export function metres(x) {
   const size = Math.abs(x);

@@ -1,9 +1,11 @@
 // Tables that people read in a terminal of 80 columns.
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
 #include <string>
 
+#include "tfdude/format.hpp"
 #include "tfdude/joint_render.hpp"
 #include "tfdude/render.hpp"
 #include "tfdude/table.hpp"
@@ -167,6 +169,19 @@ TEST_CASE("tables: the middle of a long name is left out") {
   CHECK(cell("é", 3) == "é  ");
   CHECK(number(1234.5, 1, 6) == "1234.5");
   CHECK(number(-123456789.0, 1, 10) == "-1.23e+08");
+}
+
+TEST_CASE("a number that is printed as zero has no sign") {
+  CHECK(format("%.3f", -0.0) == "0.000");
+  CHECK(format("%.3f %.3f|%7.2f", -4e-4, -6e-4, -1e-3) == "0.000 -0.001|   0.00");
+  CHECK(format("%s %.*f %d%% %.1f", "-0.0", 2, -1e-3, -0, -0.01) == "-0.0 0.00 0% 0.0");
+  CHECK(format("%*.1f %-8.1f|", 6, -0.01, -0.01) == "   0.0 0.0     |");
+  CHECK(format("% .2e %g %+.1f %f", -0.0, -0.0, -0.0, -1e-7) == " 0.00e+00 0 +0.0 0.000000");
+  CHECK(format("%.0f %.0f", -0.5, -0.6) == "0 -1");
+  CHECK(format("%g %.2e", -1e-300, -1e-300) == "-1e-300 -1.00e-300");
+  CHECK(format("%.1f", -std::numeric_limits<double>::infinity()) == "-inf");
+  CHECK(dump({{"a", -0.0}, {"b", {{"c", {-0.0, -1.5, 0}}}}, {"d", "-0.0"}}) ==
+        R"({"a":0.0,"b":{"c":[0.0,-1.5,0]},"d":"-0.0"})");
 }
 
 }  // namespace tfdude::cli
