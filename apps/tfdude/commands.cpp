@@ -33,16 +33,20 @@ int list(const Arguments& arguments, const char* key, const std::vector<std::str
   return answer(arguments, {{key, ids}}, text);
 }
 
+// Whether there is any partition.
+Result<void> somebody_there(Source source, const Arguments& arguments) {
+  const auto partitions = source.partitions();
+  if (!partitions) return tl::unexpected(partitions.error());
+  if (!partitions->empty()) return {};
+  if (!source.live()) return fail(Errc::kUnknownPartition, "the recording has no partition then");
+  return fail(Errc::kUnreachable, nobody_answers(arguments));
+}
+
 // An empty answer without any partition counts as no answer. @return the exit status
 int none_there(Source source, const Arguments& arguments, bool found) {
   if (found) return kDone;
-  const auto partitions = source.partitions();
-  if (!partitions) return report(partitions.error(), arguments);
-  if (!partitions->empty()) return kDone;
-  if (!source.live()) {
-    return report({Errc::kUnknownPartition, "the recording has no partition then"}, arguments);
-  }
-  return report({Errc::kUnreachable, nobody_answers(arguments)}, arguments);
+  const auto somebody = somebody_there(source, arguments);
+  return somebody ? kDone : report(somebody.error(), arguments);
 }
 
 int refuse_pose(const Error& error, const Arguments& arguments) {
@@ -78,10 +82,14 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
                 what + " " + arguments.id + "\n");
 }
 
-int refuse(Source source, const Error& error, const Arguments& arguments) {
-  if (is_unknown(error.code)) {
-    if (const int status = none_there(source, arguments, false); status != kDone) return status;
-  }
+Error cause_of(Source source, const Error& error, const Arguments& arguments) {
+  if (!is_unknown(error.code)) return error;
+  const auto somebody = somebody_there(source, arguments);
+  return somebody ? error : somebody.error();
+}
+
+int refuse(Source source, const Error& failed, const Arguments& arguments) {
+  const Error error = cause_of(source, failed, arguments);
   if (error.code == Errc::kUnsupported && arguments.options.follow) return kNeedsAllFrames;
   return report(error, arguments);
 }

@@ -129,6 +129,8 @@ int finish(Client& client, const Result<void>& changed, const Arguments& argumen
 [[nodiscard]] std::string profile_of(const Options& options);
 /// That no partition answers, and what may be the cause.
 [[nodiscard]] std::string nobody_answers(const Arguments& arguments);
+/// Why a request failed: with an unknown frame, it may be that no partition answers.
+[[nodiscard]] Error cause_of(Source source, const Error& error, const Arguments& arguments);
 /// Prints why the request failed. @return the exit status, or kNeedsAllFrames
 int refuse(Source source, const Error& error, const Arguments& arguments);
 

@@ -41,8 +41,8 @@ std::string remarks_of(const JointInfo& joint) {
   std::string text;
   if (!joint.measured) text += "    no sample yet\n";
   if (joint.mimic) {
-    text += format("    mimics %s (x %g + %g)\n", shortened(joint.mimic->joint, 32).c_str(),
-                   joint.mimic->multiplier, joint.mimic->offset);
+    text += "    mimics " + shortened(joint.mimic->joint, room(32)) +
+            format(" (x %g + %g)\n", joint.mimic->multiplier, joint.mimic->offset);
   }
   if (joint.outside > 0) {
     text += painted(Look::kWarning, format("    outside %llu times\n",
@@ -56,6 +56,13 @@ std::string remarks_of(const JointInfo& joint) {
 }
 
 }  // namespace
+std::vector<std::string> names_of(const std::vector<JointInfo>& joints,
+                                  std::string JointInfo::*name) {
+  std::vector<std::string> names;
+  for (const JointInfo& joint : joints) names.push_back(joint.*name);
+  return names;
+}
+
 
 std::string position_text(const JointInfo& joint, double position, const AngleUnit& angles) {
   std::string text = format("%.6g %s", in_unit(joint, position, angles), unit_of(joint, angles));
@@ -65,10 +72,12 @@ std::string position_text(const JointInfo& joint, double position, const AngleUn
 
 std::string joint_table(const std::vector<JointInfo>& joints, const AngleUnit& angles) {
   if (joints.empty()) return "";
-  const auto row = [](const std::string& name, const std::string& frame,
-                      const std::string& position, const std::string& stddev, const char* unit,
-                      const std::string& limits) {
-    return "  " + cell(name, 18) + " " + cell(frame, 15) +
+  const std::size_t name_columns = name_width(names_of(joints, &JointInfo::name), 18, 15);
+  const std::size_t frame_columns = name_width(names_of(joints, &JointInfo::frame), 15, 18);
+  const auto row = [&](const std::string& name, const std::string& frame,
+                       const std::string& position, const std::string& stddev, const char* unit,
+                       const std::string& limits) {
+    return "  " + cell(name, name_columns) + " " + cell(frame, frame_columns) +
            format(" %10s %9s %-4s %s\n", position.c_str(), stddev.c_str(), unit, limits.c_str());
   };
   std::string text =
@@ -88,10 +97,10 @@ std::string outside_table(const std::vector<JointInfo>& joints, const AngleUnit&
     if (joint.outside == 0 && joint.refused == 0) continue;
     if (text.empty()) {
       text =
-          "  " + cell("joint outside limits", 22) +
+          "  " + cell("joint outside limits", columns) +
           format(" %10s %-4s %10s %10s %s\n", "position", "unit", "applied", "rejected", "limits");
     }
-    text += "  " + cell(joint.name, 22) +
+    text += "  " + cell(joint.name, columns) +
             format(" %10s %-4s %10s %10s %s\n",
                    position_cell(joint, joint.position, angles, 10).c_str(), unit_of(joint, angles),
                    number(static_cast<double>(joint.outside), 0, 10).c_str(),
@@ -113,6 +122,7 @@ nlohmann::json joint_json(const JointInfo& joint) {
                       {"limits", nullptr},
                       {"mimic", nullptr}};
   if (joint.variance) json["variance"] = *joint.variance;
+  const std::size_t columns = name_width(names_of(joints, &JointInfo::name), 22);
   if (joint.limits) json["limits"] = {joint.limits->lower, joint.limits->upper};
   if (joint.mimic) {
     json["mimic"] = {{"joint", joint.mimic->joint},

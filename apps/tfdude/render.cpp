@@ -65,10 +65,18 @@ std::string draw_tree(const std::vector<Frame>& frames,
 }
 
 std::string partition_table(const std::vector<PartitionRow>& rows) {
-  const auto line = [](const std::string& name, const std::string& frames, const std::string& host,
-                       const std::string& pid, const std::string& samples,
-                       const std::string& memory) {
-    return cell(name, 18) + format(" %8s ", frames.c_str()) + cell(host, 16) +
+  std::vector<std::string> names;
+  std::vector<std::string> hosts;
+  for (const PartitionRow& row : rows) {
+    names.push_back(row.partition.name);
+    hosts.push_back(row.partition.host);
+  }
+  const std::size_t name_columns = name_width(names, 18, 16);
+  const std::size_t host_columns = name_width(hosts, 16, 18);
+  const auto line = [&](const std::string& name, const std::string& frames, const std::string& host,
+                        const std::string& pid, const std::string& samples,
+                        const std::string& memory) {
+    return cell(name, name_columns) + format(" %8s ", frames.c_str()) + cell(host, host_columns) +
            format(" %8s %10s %12s\n", pid.c_str(), samples.c_str(), memory.c_str());
   };
   std::string text =

@@ -50,14 +50,25 @@ std::string shortened(const std::string& text, std::size_t columns) {
   return first_characters(text, before) + "…" + text.substr(left_out.size());
 }
 
-std::string cell(const std::string& name, std::size_t at_80) {
-  constexpr std::size_t kMost = 40;  // most names are shorter: numbers should not be far from them
+std::size_t room(std::size_t at_80, std::size_t beside) {
   constexpr std::size_t kLeast = 8;
-  const std::size_t stretched = at_80 * terminal().columns / 80;
-  const std::size_t columns =
-      std::clamp(stretched, std::min(at_80, kLeast), std::max(at_80, kMost));
-  const std::string text = shortened(name, columns);
-  return text + std::string(columns - length_of(text), ' ');
+  const std::size_t columns = terminal().columns;
+  if (columns == kUnlimited) return kUnlimited;
+  if (columns >= 80) return at_80 + (columns - 80) * at_80 / (at_80 + beside);
+  return std::max(at_80 * columns / 80, std::min(at_80, kLeast));
+}
+
+std::size_t name_width(const std::vector<std::string>& names, std::size_t at_80,
+                       std::size_t beside) {
+  const std::size_t most = room(at_80, beside);
+  std::size_t width = std::min(at_80, most);
+  for (const std::string& name : names) width = std::max(width, length_of(name));
+  return std::min(width, most);
+}
+
+std::string cell(const std::string& name, std::size_t width) {
+  const std::string text = shortened(name, width);
+  return text + std::string(width - length_of(text), ' ');
 }
 
 std::string number(double value, int decimals, std::size_t columns) {

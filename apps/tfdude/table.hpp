@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 // Parts of tables that fit a terminal, however long names and numbers are.
 namespace tfdude::cli {
@@ -16,9 +17,17 @@ namespace tfdude::cli {
 /// differ only at their ends.
 [[nodiscard]] std::string shortened(const std::string& text, std::size_t columns);
 
+/// The most that a name may have on this terminal. What it has beyond 80 columns is for names.
+/// @param at_80  the most that the name may have on a terminal of 80 columns
+/// @param beside  the same of other names in that line
+[[nodiscard]] std::size_t room(std::size_t at_80, std::size_t beside = 0);
+
+/// The width of a column of names: as the longest of them needs, at most room().
+[[nodiscard]] std::size_t name_width(const std::vector<std::string>& names, std::size_t at_80,
+                                     std::size_t beside = 0);
+
 /// A name at the left of its column, shortened if it is too long.
-/// @param at_80  the width of the column on a terminal of 80 columns; a wider one has more room
-[[nodiscard]] std::string cell(const std::string& name, std::size_t at_80);
+[[nodiscard]] std::string cell(const std::string& name, std::size_t width);
 
 /// A number with so many decimals; in powers of ten if it would need too many columns.
 [[nodiscard]] std::string number(double value, int decimals, std::size_t columns);

@@ -25,6 +25,13 @@ bool wants_colours() {
   return (no_colour == nullptr || *no_colour == 0) && kind != nullptr &&
          std::string_view(kind) != "dumb";
 }
+
+std::size_t wanted_columns() {
+  const char* columns = std::getenv("COLUMNS");
+  const long wanted = columns == nullptr ? 0 : std::strtol(columns, nullptr, 10);
+  return wanted > 0 && wanted < static_cast<long>(kUnlimited) ? static_cast<std::size_t>(wanted)
+                                                              : 0;
+}
 // NOLINTEND(concurrency-mt-unsafe)
 
 }  // namespace
@@ -36,9 +43,13 @@ Terminal& terminal() {
 
 Terminal terminal_of(int file) {
   Terminal found;
-  if (isatty(file) == 0) return found;
+  if (isatty(file) == 0) return {false, kUnlimited};
   winsize size{};
-  if (ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) found.columns = size.ws_col;
+  if (const std::size_t wanted = wanted_columns(); wanted > 0) {
+    found.columns = wanted;
+  } else if (ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) {
+    found.columns = size.ws_col;
+  }
   found.colours = wants_colours();
   return found;
 }

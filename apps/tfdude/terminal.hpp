@@ -3,9 +3,12 @@
 #include <cstddef>
 #include <string>
 
-// How answers look on a terminal. In a pipe or file, and in tests, they have no colours, and tables
+// How answers look on a terminal. In a pipe or file they have no colours, and nothing is cut; tests
 // have 80 columns.
 namespace tfdude::cli {
+
+/// More than any text has.
+inline constexpr std::size_t kUnlimited = 1'000'000'000;
 
 struct Terminal {
   bool colours = false;
@@ -15,7 +18,8 @@ struct Terminal {
 /// That of this process.
 [[nodiscard]] Terminal& terminal();
 
-/// What an open file is. Without colours if the environment's NO_COLOR is not empty, or TERM is
+/// What an open file is. A terminal is as wide as the environment's COLUMNS says, or as it says
+/// itself; a file that is none is of kUnlimited columns. Without colours if the environment's NO_COLOR is not empty, or TERM is
 /// "dumb".
 [[nodiscard]] Terminal terminal_of(int file);
 

@@ -50,33 +50,41 @@ Result<StampedTransform> look_up(Source source, const Arguments& arguments) {
   return source.lookup(arguments.id, arguments.other, *at, wait);
 }
 
-// Calls show() with the path's newest transform at the rate, until interrupted. While the path
-// cannot be watched, or an owner is unreachable, it reports that instead.
+// Calls show() with the path's newest transform at the rate, until interrupted. If the path cannot
+// be watched, or an owner is unreachable, it reports that instead, each reason once.
 template <class Show>
 int follow(Client& client, const Arguments& arguments, Show show) {
   std::optional<PathWatch> path;
   WatchOptions options;
   options.rate = arguments.rate;
   options.composed = arguments.composed;
+  std::optional<Error> reported;
+  const auto complain = [&](const Error& error) {
+    const bool again =
+        reported && reported->code == error.code && reported->message == error.message;
+    if (!again) (void)report(error, arguments);
+    reported = error;
+  };
   do {
     if (!path) {
       auto watched = client.watch(arguments.id, arguments.other, options);
       if (watched) {
         path = *std::move(watched);
       } else {
-        (void)refuse(client, watched.error(), arguments);
+        complain(cause_of(client, watched.error(), arguments));
         continue;
       }
     }
     if (const auto health = path->health(); !health) {
-      (void)report(health.error(), arguments);
+      complain(health.error());
       continue;
     }
     const auto X_AB = path->latest();
     if (X_AB) {
       show(*X_AB);
+      reported.reset();
     } else {
-      (void)report(X_AB.error(), arguments);
+      complain(X_AB.error());
     }
   } while (!interrupted_within(1.0 / arguments.rate));
   return kDone;

@@ -107,7 +107,7 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * angles.per_radian;
   const auto s = X_AB.covariance.of_specified().stddev();
-  std::string text = shortened(b, 34) + " seen from " + shortened(a, 34) + "\n";
+  std::string text = shortened(b, room(34, 34)) + " seen from " + shortened(a, room(34, 34)) + "\n";
   text += format("position  %12.6f %12.6f %12.6f m\n", t.x(), t.y(), t.z());
   const auto row = [&](double x, double y, double z) {
     return format("%12.*f %12.*f %12.*f %s\n", angles.decimals, x, angles.decimals, y,
@@ -116,7 +116,7 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
   text += "rpy       " + row(rpy.x(), rpy.y(), rpy.z());
   const bool complete = X_AB.covariance.complete();
   if (!complete) {
-    text += "std dev   " + shortened(unspecified_text(X_AB.basis.unspecified), 70) + "\n";
+    text += "std dev   " + shortened(unspecified_text(X_AB.basis.unspecified), room(70)) + "\n";
   }
   text += (complete ? "std dev   " : "of others ") +
           format("%12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
@@ -128,12 +128,15 @@ std::string echo_lines(const std::string& a, const std::string& b, const Stamped
 std::string monitor_table(const std::string& partition, const std::vector<HistoryInfo>& histories,
                           std::optional<Time> now) {
   std::string text =
-      "partition " + shortened(partition, 24) + ": " + describe(sum_of(histories)) + "\n";
+      "partition " + shortened(partition, room(24)) + ": " + describe(sum_of(histories)) + "\n";
   if (histories.empty()) return text;
-  const auto row = [](const std::string& edge, const std::string& rate, const std::string& age,
-                      const std::string& jitter, const std::string& gap,
-                      const std::string& rejected) {
-    return "  " + cell(edge, 22) +
+  std::vector<std::string> edges;
+  for (const HistoryInfo& history : histories) edges.push_back(history.id);
+  const std::size_t columns = name_width(edges, 22);
+  const auto row = [&](const std::string& edge, const std::string& rate, const std::string& age,
+                       const std::string& jitter, const std::string& gap,
+                       const std::string& rejected) {
+    return "  " + cell(edge, columns) +
            format(" %10s %10s %11s %10s %9s\n", rate.c_str(), age.c_str(), jitter.c_str(),
                   gap.c_str(), rejected.c_str());
   };

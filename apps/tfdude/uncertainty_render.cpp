@@ -93,10 +93,13 @@ nlohmann::json observed_json(const Observed& observed) {
 
 std::string consistency_table(const std::vector<EdgeConsistency>& edges) {
   if (edges.empty()) return "";
-  const auto row = [](const std::string& edge, const std::string& observed,
-                      const std::string& rejected, const std::string& factor,
-                      const std::string& deviations, const char* covariance) {
-    return "  " + cell(edge, 22) +
+  std::vector<std::string> ids;
+  for (const EdgeConsistency& edge : edges) ids.push_back(edge.id);
+  const std::size_t columns = name_width(ids, 22);
+  const auto row = [&](const std::string& edge, const std::string& observed,
+                       const std::string& rejected, const std::string& factor,
+                       const std::string& deviations, const char* covariance) {
+    return "  " + cell(edge, columns) +
            format(" %8s %8s %9s %10s  %s\n", observed.c_str(), rejected.c_str(), factor.c_str(),
                   deviations.c_str(), covariance);
   };

@@ -1,5 +1,6 @@
 // Time on the command line, with real daemons.
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -194,6 +195,28 @@ TEST_CASE("time: watch shows what is written and follows a frame that is moved")
   REQUIRE(echo.wait_for_line("age       none", in_time()));
   echo.signal(SIGINT);
   CHECK(echo.wait(in_time()) == 0);
+}
+
+TEST_CASE("cli: watch and echo say once why there is nothing to show") {
+  const ThesisDaemons d;
+  const std::string command = GENERATE("watch", "echo");
+  CAPTURE(command);
+  Process watch = d.domain.start_cli({command, "world", "probe", "--rate", "50"});
+  const auto complaints = [&] {
+    (void)watch.runs();
+    return std::count(watch.err().begin(), watch.err().end(), '\n');
+  };
+  REQUIRE(eventually([&] { return complaints() > 0 && watch.err().find("'probe'") < 1000; }));
+  const auto before = complaints();
+  // Long enough for it to be repeated before the frame is there.
+  CHECK(d.domain.cli({"exists", "probe"}).status == 1);
+  CHECK(text(d, {"add", "probe", "--parent", "world"}) == "added probe\n");
+  REQUIRE(watch.wait_for_line(command == "watch" ? "translation" : "probe seen", in_time()));
+  CHECK(complaints() == before);
+  CHECK(text(d, {"remove", "probe"}) == "removed probe\n");
+  CHECK(eventually([&] { return complaints() > before; }));
+  watch.signal(SIGINT);
+  CHECK(watch.wait(in_time()) == 0);
 }
 
 TEST_CASE("cli: tree and lookup are redrawn until interrupted") {

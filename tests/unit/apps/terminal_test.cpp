@@ -2,6 +2,12 @@
 
 #include "tfdude/terminal.hpp"
 
+#include <cstdlib>
+#include <fcntl.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "tfdude/joint_render.hpp"
 #include "tfdude/screen.hpp"
 #include "tfdude/table.hpp"
 
@@ -11,6 +17,29 @@ namespace tfdude::cli {
 namespace {
 
 constexpr Terminal kColours{true, 80};
+
+// A terminal of 123 columns.
+class Pty {
+ public:
+  Pty() : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    if (grantpt(master_) != 0 || unlockpt(master_) != 0) return;
+    file_ = open(ptsname(master_), O_RDWR | O_NOCTTY);
+    winsize size{40, 123, 0, 0};
+    ioctl(file_, TIOCSWINSZ, &size);
+  }
+  ~Pty() {
+    close(file_);
+    close(master_);
+  }
+  Pty(const Pty&) = delete;
+  Pty& operator=(const Pty&) = delete;
+
+  [[nodiscard]] int file() const { return file_; }
+
+ private:
+  int master_;
+  int file_ = -1;
+};
 
 }  // namespace
 
@@ -34,13 +63,42 @@ TEST_CASE("terminal: colours have no width, and end where a text is cut") {
 
 TEST_CASE("terminal: columns of names are as wide as the terminal allows") {
   const std::string name(60, 'n');
-  CHECK(length_of(cell(name, 18)) == 18);
+  CHECK(name_width({name}, 18) == 18);
+  CHECK(name_width({"a"}, 18) == 18);
   for (const auto& [columns, width] :
-       {std::pair<std::size_t, std::size_t>(160, 36), {400, 40}, {60, 13}, {20, 8}}) {
+       {std::pair<std::size_t, std::size_t>(100, 38), {400, 60}, {60, 13}, {20, 8}}) {
     terminal().columns = columns;
-    CHECK(length_of(cell(name, 18)) == width);
+    CHECK(name_width({"a", name}, 18) == width);
+    CHECK(length_of(cell(name, width)) == width);
   }
+  terminal().columns = 100;
+  CHECK(name_width({name}, 18, 12) == 30);
+  CHECK(name_width({name}, 12, 18) == 20);
   terminal() = {};
+}
+
+TEST_CASE("terminal: what is no terminal has no width, and one has that of COLUMNS or its own") {
+  CHECK(terminal_of(-1).columns == kUnlimited);
+  terminal().columns = kUnlimited;
+  const std::string name(255, 'n');
+  CHECK(cell(name, name_width({name}, 18, 15)) == name);
+  JointInfo joint;
+  joint.name = joint.frame = name;
+  joint.mimic = Mimic{name, 1, 0};
+  const std::string table = joint_table({joint}, kRadian);
+  CHECK(table.find(name + " " + name + " ") != std::string::npos);
+  CHECK(table.find("mimics " + name + " (x 1 + 0)\n") != std::string::npos);
+  terminal() = {};
+
+  const Pty pty;
+  REQUIRE(pty.file() >= 0);
+  unsetenv("COLUMNS");
+  CHECK(terminal_of(pty.file()).columns == 123);
+  setenv("COLUMNS", "200", 1);
+  CHECK(terminal_of(pty.file()).columns == 200);
+  setenv("COLUMNS", "wide", 1);
+  CHECK(terminal_of(pty.file()).columns == 123);
+  unsetenv("COLUMNS");
 }
 
 }  // namespace tfdude::cli
