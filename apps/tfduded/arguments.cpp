@@ -97,6 +97,19 @@ class UrdfOptions {
   CLI::Option* strict_;
 };
 
+// @throws CLI::ParseError if there are several, and options that are only for one
+void set_configs(const std::vector<std::string>& configs, Arguments& arguments) {
+  if (!configs.empty()) arguments.config = configs.front();
+  if (configs.size() < 2) return;
+  arguments.further.assign(configs.begin() + 1, configs.end());
+  if (!arguments.check) throw CLI::ValidationError("--config", "is given twice without --check");
+  if (!arguments.partition.empty() || !arguments.urdfs.empty() || !arguments.options.keys.empty()) {
+    throw CLI::ValidationError("--config",
+                               "is given twice with --partition, --urdf or --keys, which are "
+                               "those of one daemon");
+  }
+}
+
 }  // namespace
 
 std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
@@ -105,14 +118,17 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   CLI::App app{"tfduded: owns a partition of the coordinate frames and serves it over DDS"};
   app.footer(
       "Exit status: 0 stopped by a signal, 1 the partition is served by another process, or DDS "
-      "cannot start, 2 wrong usage, configuration or state.\n"
+      "cannot start, 2 wrong usage, configuration or state, or configurations that contradict "
+      "each other.\n"
       "Example: tfduded --partition arms --config examples/thesis/arms.yaml --domain 7");
   app.set_version_flag("--version", version_line());
   app.add_option("--partition", arguments.partition, "the partition's name");
-  app.add_option("--config", arguments.config, "YAML file of frames");
+  std::vector<std::string> configs;
+  app.add_option("--config", configs, "YAML file of frames; with --check several, of all daemons");
   app.add_flag("--check", arguments.check,
                "check configuration, URDF, keys and stored state, print what would be served and "
-               "what would change in the state, and write nothing");
+               "what would change in the state, and write nothing; also whether several "
+               "configurations fit together");
   const UrdfOptions urdfs(app);
   cli::add_network_options(app, arguments.options);
   cli::add_clock_option(app, [&](ClockKind kind) { arguments.clock = kind; });
@@ -147,6 +163,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));
     arguments.urdfs = urdfs.parts();
+    set_configs(configs, arguments);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kWrongUsage;
   }

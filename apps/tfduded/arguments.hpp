@@ -15,6 +15,7 @@ inline constexpr int kWrongUsage = 2;
 struct Arguments {
   std::string partition;
   std::string config;
+  std::vector<std::string> further;  ///< configurations to check together with it
   std::vector<UrdfPart> urdfs;
   bool check = false;  ///< only print what the configuration would change
   std::optional<ClockKind> clock;

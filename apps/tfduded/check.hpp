@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "tfdude/description/config.hpp"
 
 #include "arguments.hpp"
@@ -10,5 +13,10 @@ namespace tfdude::daemon {
 /// Checks the keys, too. Joins no domain, and writes no file.
 /// @return the exit status: 0, or kWrongUsage if the daemon would not start
 [[nodiscard]] int check(const Arguments& arguments, const Config& config);
+
+/// What is wrong with the configurations of a robot's daemons if they run together: a partition, a
+/// frame or a joint of two of them, a parent or a mimicked joint that none has, a cycle. Messages
+/// name the places.
+[[nodiscard]] std::vector<std::string> contradictions(const std::vector<Config>& configs);
 
 }  // namespace tfdude::daemon

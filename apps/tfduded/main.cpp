@@ -1,9 +1,12 @@
 // The daemon of one subsystem: loads its frames, owns them, and serves them until a signal stops
 // it.
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <spdlog/spdlog.h>
 
@@ -52,7 +55,31 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   return config;
 }
 
+// Each as its daemon would see it, and whether all fit together.
+int check_all(Arguments arguments) {
+  std::vector<std::string> files = std::exchange(arguments.further, {});
+  files.insert(files.begin(), arguments.config);
+  std::vector<tfdude::Config> configs;
+  int status = 0;
+  for (const std::string& file : files) {
+    arguments.config = file;
+    auto config = configure(arguments);
+    if (!config) {
+      spdlog::error("{}", config.error().message);
+      return kWrongUsage;
+    }
+    status = std::max(status, tfdude::daemon::check(arguments, *config));
+    configs.push_back(*std::move(config));
+  }
+  for (const std::string& wrong : tfdude::daemon::contradictions(configs)) {
+    spdlog::error("{}", wrong);
+    status = kWrongUsage;
+  }
+  return status;
+}
+
 int serve(const Arguments& arguments, const sigset_t& stop_signals) {
+  if (!arguments.further.empty()) return check_all(arguments);
   const auto config = configure(arguments);
   if (!config) {
     spdlog::error("{}", config.error().message);

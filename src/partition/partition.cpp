@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "partition/requests.hpp"
+#include "partition/taken_frames.hpp"
 
 namespace tfdude {
 namespace {
@@ -43,7 +44,6 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
 
 // Takes all frames or none.
 Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time) {
-  std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
     auto ok = check_new_id(frame.id, "id");
     for (const CommonError& one : frame.correlation.common_errors) {
@@ -51,6 +51,7 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
     }
     if (!ok) return ok;
   }
+  std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {
     // Frames of a partition that is gone may be taken.
     (void)directory_.take(frame.id);
@@ -63,7 +64,9 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
         (void)forest_.remove(id);
         directory_.released(id);
       }
-      return added;
+      if (added.error().code != Errc::kAlreadyExists) return added;
+      auto free = check_all_free(forest_, directory_, frames);
+      return free ? added : free;
     }
   }
   for (const FrameSpec& frame : frames) put(frame.id, frame.parent, lamport_time);
@@ -179,10 +182,10 @@ Result<void> Partition::apply(const Request& request, Time now) {
 }
 
 Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
+  if (auto ok = check_new_id(id, "id"); !ok) return ok;
   if (frame_count() >= max_frames_) {
     ++refused_frames_;
     return fail(Errc::kTooMuch, "frame " + quote(id) + " is not added: partition " + quote(name_) +
-  if (auto ok = check_new_id(id, "id"); !ok) return ok;
                                     " has " + std::to_string(frame_count()) + " frames, its limit");
   }
   directory_.saw_lamport_time(request.lamport_time);
@@ -308,12 +311,12 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
   if (!correlation.observed_with.empty()) {
     return fail(Errc::kInvalidInput, who + ": only observations set what it was observed with");
   }
-  if (joints_.is_coupled(id)) {
-    return fail(Errc::kInvalidInput, who +
-                                         " is moved by a joint that others mimic; its correlation "
   for (const CommonError& one : correlation.common_errors) {
     if (auto ok = check_new_id(one.source, "source"); !ok) return fail_at(who, ok.error());
   }
+  if (joints_.is_coupled(id)) {
+    return fail(Errc::kInvalidInput, who +
+                                         " is moved by a joint that others mimic; its correlation "
                                          "cannot be set");
   }
   if (auto said = forest_.correlate(id, correlation); !said) {

@@ -210,6 +210,74 @@ TEST_CASE("reconfigured: --check tells what a configuration describes, and needs
   CHECK_THAT(no_keys.err, ContainsSubstring("none"));
 }
 
+TEST_CASE("reconfigured: --check tells whether several configurations fit together") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const auto config = [&](const std::string& partition, const std::string& rest) {
+    return directory.write(partition + ".yaml", "partition: " + partition + "\n" + rest);
+  };
+  const auto urdf = [&](const std::string& prefix) {
+    return "urdf: [{file: " + directory.path() + "/arm.urdf, prefix: " + prefix +
+           ", root: world}]\n";
+  };
+  (void)directory.write("arm.urdf", R"(<robot name="arm">
+  <link name="base"/> <link name="upper"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/> <child link="upper"/> <axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>)");
+  const std::string world = config("world", "frames: [{id: world}]\n");
+  const std::string left = config("left", urdf("left_"));
+  const std::string right = config("right", urdf("right_"));
+  const auto check = [&](const Arguments& files) {
+    Arguments arguments{"--check", "--no-state"};
+    for (const std::string& file : files) arguments.insert(arguments.end(), {"--config", file});
+    Process process = domain.start_daemon(arguments);
+    return finish(process);
+  };
+  const CliResult good = check({world, left, right});
+  INFO(good.err);
+  CHECK(good.status == 0);
+  CHECK_THAT(good.out,
+             ContainsSubstring("partition 'left'") && ContainsSubstring("partition 'right'"));
+  const auto wrong = [&](const Arguments& files, const std::string& why) {
+    const CliResult result = check(files);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, ContainsSubstring(why));
+  };
+  wrong({left, right}, "no configuration has its parent 'world'");
+  wrong({world, left, config("other", urdf("left_"))}, "frame 'left_base' is in ");
+  wrong({world, left, config("other", urdf("left_"))}, "joint 'left_shoulder' is in ");
+  wrong({world, left, left}, "partition 'left' has two configurations");
+  const std::string a = config("a", "frames: [{id: a, parent: b}]\n");
+  wrong({a, config("b", "frames: [{id: b, parent: a}]\n")}, "lies below itself");
+  Process serving = domain.start_daemon({"--config", world, "--config", left});
+  CHECK(finish(serving).status == 2);
+}
+
+TEST_CASE("reconfigured: a daemon says who owns the links that it cannot have") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const std::string urdf = directory.write("robot.urdf", R"(<robot name="r">
+  <link name="base"/> <link name="torso"/> <link name="hand"/> <link name="head"/>
+  <joint name="a" type="fixed"><parent link="base"/><child link="torso"/></joint>
+  <joint name="b" type="fixed"><parent link="torso"/><child link="hand"/></joint>
+  <joint name="c" type="fixed"><parent link="torso"/><child link="head"/></joint>
+</robot>)");
+  Process first =
+      domain.start_daemon({"--partition", "arm", "--urdf", urdf, "--links", "hand", "--no-state"});
+  REQUIRE(!await_ready(first).empty());
+  Process second = domain.start_daemon({"--partition", "body", "--urdf", urdf, "--no-state"});
+  const CliResult refused = finish(second);
+  CHECK(refused.status == 1);
+  CHECK_THAT(refused.err, ContainsSubstring("frame 'hand' belongs to partition 'arm'") &&
+                              ContainsSubstring("links: [base..torso, head]"));
+  Process third = domain.start_daemon(
+      {"--partition", "body", "--urdf", urdf, "--links", "base..torso,head", "--no-state"});
+  CHECK_THAT(await_ready(third), ContainsSubstring("frames=3"));
+}
+
 TEST_CASE("reconfigured: correlations from observations and requests survive a kill") {
   Arms arms;
   auto client = *Client::open(arms.domain.options());

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "partition/directory.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude {
+
+/// Whether no other partition owns one of the frames.
+/// @return kAlreadyExists naming the frames, their owners, and which links of a URDF are left.
+[[nodiscard]] Result<void> check_all_free(const Forest& forest, const Directory& directory,
+                                          const std::vector<FrameSpec>& frames);
+
+}  // namespace tfdude
