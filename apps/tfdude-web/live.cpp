@@ -151,6 +151,7 @@ void Live::note_refused(const std::string& partition, const HistoryInfo& history
 void Live::add_event(const Change& change) {
   const bool bad = change.kind == ChangeKind::kPartitionDown ||
                    change.kind == ChangeKind::kConflict ||
+                   change.kind == ChangeKind::kJointConflict ||
                    change.kind == ChangeKind::kFrameOrphaned || change.kind == ChangeKind::kMissed;
   add_event({0, change.time, bad ? "warning" : "info", cli::change_json(change)});
 }

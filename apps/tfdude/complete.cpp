@@ -191,6 +191,7 @@ std::vector<Candidate> names_of(Completed kind, Options options) {
     }
     return names;
   }
+  std::map<std::string, std::vector<std::string>> partitions_of;  // by joint
   for (const PartitionInfo& partition :
        client->partitions().value_or(std::vector<PartitionInfo>())) {
     if (kind == Completed::kPartitions) {
@@ -198,7 +199,13 @@ std::vector<Candidate> names_of(Completed kind, Options options) {
       continue;
     }
     for (JointInfo& joint : client->joints(partition.name).value_or(std::vector<JointInfo>())) {
-      names.push_back({std::move(joint.name), "joint of " + partition.name});
+      partitions_of[std::move(joint.name)].push_back(partition.name);
+    }
+  }
+  for (const auto& [joint, partitions] : partitions_of) {
+    for (const std::string& partition : partitions) {
+      const bool contested = partitions.size() > 1;
+      names.push_back({contested ? partition + "/" + joint : joint, "joint of " + partition});
     }
   }
   return names;

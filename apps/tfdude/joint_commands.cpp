@@ -1,3 +1,5 @@
+#include <map>
+
 #include "tfdude/base/id.hpp"
 
 #include "../numbers.hpp"
@@ -83,19 +85,30 @@ int run_joints(Source source, const Arguments& arguments) {
   const auto partitions = source.partitions();
   if (!partitions) return refuse(source, partitions.error(), arguments);
   if (partitions->empty()) return refuse(source, {Errc::kUnknownPartition, ""}, arguments);
+  std::map<std::string, Result<std::vector<JointInfo>>> joints_of;
+  SameNames same_names;
+  for (const PartitionInfo& partition : *partitions) {
+    const auto& joints =
+        joints_of.emplace(partition.name, source.joints(partition.name)).first->second;
+    if (joints) same_names.add(partition.name, *joints);
+  }
   nlohmann::json json = nlohmann::json::array();
   std::string text;
-  for (const PartitionInfo& partition : *partitions) {
-    const auto joints = source.joints(partition.name);
-    nlohmann::json one{{"partition", partition.name}, {"reachable", joints.has_value()}};
+  for (const auto& [partition, joints] : joints_of) {
+    nlohmann::json one{{"partition", partition}, {"reachable", joints.has_value()}};
     if (!joints) {
-      text += "partition " + partition.name + ": " + joints.error().message + "\n";
+      text += "partition " + partition + ": " + joints.error().message + "\n";
     } else if (!joints->empty()) {
-      text += "partition " + partition.name + "\n" + joint_table(*joints, arguments.angles);
+      text += "partition " + partition + "\n" + joint_table(*joints, arguments.angles) +
+              same_names.warnings(partition, *joints);
     }
     if (joints) {
       one["joints"] = nlohmann::json::array();
-      for (const JointInfo& joint : *joints) one["joints"].push_back(joint_json(joint));
+      for (const JointInfo& joint : *joints) {
+        one["joints"].push_back(joint_json(joint));
+        const auto others = same_names.others(partition, joint);
+        if (!others.empty()) one["joints"].back()["also_in"] = others;
+      }
     }
     json.push_back(std::move(one));
   }

@@ -1,5 +1,6 @@
 #include "joint_render.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "format.hpp"
@@ -55,7 +56,6 @@ std::string remarks_of(const JointInfo& joint) {
   return text;
 }
 
-}  // namespace
 std::vector<std::string> names_of(const std::vector<JointInfo>& joints,
                                   std::string JointInfo::*name) {
   std::vector<std::string> names;
@@ -63,6 +63,7 @@ std::vector<std::string> names_of(const std::vector<JointInfo>& joints,
   return names;
 }
 
+}  // namespace
 
 std::string position_text(const JointInfo& joint, double position, const AngleUnit& angles) {
   std::string text = format("%.6g %s", in_unit(joint, position, angles), unit_of(joint, angles));
@@ -91,8 +92,37 @@ std::string joint_table(const std::vector<JointInfo>& joints, const AngleUnit& a
   return text;
 }
 
+void SameNames::add(const std::string& partition, const std::vector<JointInfo>& joints) {
+  for (const JointInfo& joint : joints) {
+    if (!joint.mimic) partitions_[joint.name].push_back(partition);
+  }
+}
+
+std::vector<std::string> SameNames::others(const std::string& partition,
+                                           const JointInfo& joint) const {
+  const auto found = partitions_.find(joint.name);
+  if (joint.mimic || found == partitions_.end()) return {};
+  std::vector<std::string> others = found->second;
+  others.erase(std::remove(others.begin(), others.end(), partition), others.end());
+  return others;
+}
+
+std::string SameNames::warnings(const std::string& partition,
+                                const std::vector<JointInfo>& joints) const {
+  std::string text;
+  for (const JointInfo& joint : joints) {
+    const auto others = this->others(partition, joint);
+    if (others.empty()) continue;
+    std::string line = "    conflict: " + joint.name + " is also a joint of ";
+    for (std::size_t i = 0; i < others.size(); ++i) line += (i == 0 ? "" : ", ") + others[i];
+    text += painted(Look::kBad, line + "; publish it as " + partition + "/" + joint.name + "\n");
+  }
+  return text;
+}
+
 std::string outside_table(const std::vector<JointInfo>& joints, const AngleUnit& angles) {
   std::string text;
+  const std::size_t columns = name_width(names_of(joints, &JointInfo::name), 22);
   for (const JointInfo& joint : joints) {
     if (joint.outside == 0 && joint.refused == 0) continue;
     if (text.empty()) {
@@ -122,7 +152,6 @@ nlohmann::json joint_json(const JointInfo& joint) {
                       {"limits", nullptr},
                       {"mimic", nullptr}};
   if (joint.variance) json["variance"] = *joint.variance;
-  const std::size_t columns = name_width(names_of(joints, &JointInfo::name), 22);
   if (joint.limits) json["limits"] = {joint.limits->lower, joint.limits->upper};
   if (joint.mimic) {
     json["mimic"] = {{"joint", joint.mimic->joint},

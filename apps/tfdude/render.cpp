@@ -241,7 +241,8 @@ nlohmann::json change_json(const Change& change) {
   const std::pair<const char*, const std::string&> names[] = {{"partition", change.partition},
                                                               {"frame", change.frame},
                                                               {"parent", change.parent},
-                                                              {"rival", change.rival}};
+                                                              {"rival", change.rival},
+                                                              {"joint", change.joint}};
   for (const auto& [key, name] : names) {
     if (!name.empty()) json[key] = name;
   }

@@ -99,11 +99,14 @@ void bind_structure(py::module_& module) {
       .def_property_readonly(
           "kind", [](const Change& change) { return std::string(to_string(change.kind)); },
           "'partition_up', 'partition_down', 'frame_added', 'frame_removed', 'frame_moved',\n"
-          "'conflict', 'history_restarted', 'frame_orphaned', 'frame_taken_over' or 'missed'.")
+          "'conflict', 'joint_conflict', 'history_restarted', 'frame_orphaned', 'frame_taken_over' "
+          "or\n"
+          "'missed'.")
       .def_readonly("partition", &Change::partition)
       .def_readonly("frame", &Change::frame, "Empty if it concerns a partition.")
       .def_readonly("parent", &Change::parent)
       .def_readonly("rival", &Change::rival)
+      .def_readonly("joint", &Change::joint, "Of a conflict of joints.")
       .def_readonly("message", &Change::message, "For people.")
       .def_property_readonly(
           "stamp", [](const Change& change) { return from_stamp(change.time); }, "[ns]")

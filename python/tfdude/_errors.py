@@ -52,6 +52,7 @@ class UnspecifiedCovariance(TransformException):
 
 _BY_CODE: dict[str, type[TransformException]] = {
     "invalid_input": InvalidArgumentException,
+    "ambiguous_joint": InvalidArgumentException,
     "unknown_frame": LookupException,
     "unknown_start": LookupException,
     "unknown_end": LookupException,

@@ -54,6 +54,8 @@ std::string_view to_string(Errc code) {
       return "not_permitted";
     case Errc::kTooMuch:
       return "too_much";
+    case Errc::kAmbiguousJoint:
+      return "ambiguous_joint";
   }
   return "unknown";
 }

@@ -33,6 +33,8 @@ std::string_view to_string(ChangeKind kind) {
       return "frame_taken_over";
     case ChangeKind::kMissed:
       return "missed";
+    case ChangeKind::kJointConflict:
+      return "joint_conflict";
   }
   return "unknown";
 }

@@ -177,38 +177,6 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   note_epoch(partition, page);
 }
 
-void Directory::add_joint(const PageJoint& joint, Owner owner) {
-  joint_owners_[joint.name].insert(owner);
-  if (!joint.follows.empty()) joint_owners_[joint.follows].insert(owner);
-}
-
-void Directory::forget_joint(const PageJoint& joint, Owner owner) {
-  for (const std::string& name : {joint.name, joint.follows}) {
-    const auto known = joint_owners_.find(name);
-    if (known == joint_owners_.end()) continue;
-    if (const auto one = known->second.find(owner); one != known->second.end()) {
-      known->second.erase(one);
-    }
-    if (known->second.empty()) joint_owners_.erase(known);
-  }
-}
-
-void Directory::replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner) {
-  if (kept.joints == joints) return;
-  ++version_;
-  for (const PageJoint& joint : kept.joints) forget_joint(joint, owner);
-  kept.joints = joints;
-  for (const PageJoint& joint : joints) add_joint(joint, owner);
-}
-
-std::vector<Owner> Directory::joint_owners(const std::string& name) const {
-  const auto known = joint_owners_.find(name);
-  if (known == joint_owners_.end()) return {};
-  std::vector<Owner> owners(known->second.begin(), known->second.end());
-  owners.erase(std::unique(owners.begin(), owners.end()), owners.end());
-  return owners;
-}
-
 // A page that was replaced before its delivery arrives after those that were published later. Of
 // pages with one epoch, one lists all that have to be there.
 void Directory::note_epoch(Known& partition, const Page& page) {

@@ -88,18 +88,18 @@ class Directory {
   [[nodiscard]] std::vector<Outdated> take_outdated() { return std::exchange(outdated_, {}); }
 
   /// Adds a joint of this process's partition.
-  void put_own_joint(const PageJoint& joint) {
-    ++version_;
-    add_joint(joint, kHeldHere);
-  }
-  void erase_own_joint(const PageJoint& joint) {
-    ++version_;
-    forget_joint(joint, kHeldHere);
-  }
+  void put_own_joint(const PageJoint& joint);
+  void erase_own_joint(const PageJoint& joint);
 
-  /// The owners of a joint of this name, or of one that follows it, without duplicates. O(log
-  /// joints).
-  [[nodiscard]] std::vector<Owner> joint_owners(const std::string& name) const;
+  /// Where positions of a joint go: to the owners of a joint of this name, or of one that follows
+  /// it. A name that no joint has may be PARTITION/JOINT. O(log joints).
+  struct JointRoute {
+    std::string name;           ///< that the owners know
+    std::vector<Owner> owners;  ///< without duplicates
+  };
+  /// @return kUnknownJoint; kAmbiguousJoint if joints of several partitions have this name, so that
+  ///   one message would move several robots
+  [[nodiscard]] Result<JointRoute> route_joint(const std::string& name) const;
 
   /// This process released a frame: the claim of another partition may now be in force.
   void released(const std::string& id) { claims_.released(id); }
@@ -252,8 +252,21 @@ class Directory {
   static void note_epoch(Known& partition, const Page& page);
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);
   void unclaim_all_but(const Ids& stays, Known& partition, Owner owner, std::uint32_t number);
+  /// Those who have to do with a joint's name; one entry per joint and page.
+  struct JointUse {
+    std::multiset<Owner> movers;  // have a joint of that name, which follows none
+    std::multiset<Owner> others;  // have one that follows another, or one that follows this one
+  };
   void add_joint(const PageJoint& joint, Owner owner);
   void forget_joint(const PageJoint& joint, Owner owner);
+  void forget_use(const std::string& name, std::multiset<Owner> JointUse::*part, Owner owner);
+  /// Whether it may own a frame; another partition may have all frames of one that is absent.
+  [[nodiscard]] bool has_frames(Owner owner) const;
+  [[nodiscard]] std::vector<Owner> movers_of(const JointUse& use) const;
+  [[nodiscard]] Result<JointRoute> route_joint_of(Owner owner, const std::string& name) const;
+  [[nodiscard]] std::string named_by_partition(const std::string& joint,
+                                               const std::vector<Owner>& owners) const;
+  void report_contested(const std::string& joint);
   void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
   [[nodiscard]] static std::vector<Tombstone> new_tombstones(
       const Known& partition, const std::vector<Tombstone>& tombstones);
@@ -265,8 +278,9 @@ class Directory {
   FrameClaims claims_;
   std::vector<Known> partitions_;  // by Owner; the first is the own one
   std::unordered_map<std::string, Owner> owners_;
-  std::set<PendingYield> orphans_;  // held frames whose parent another partition removed
-  std::map<std::string, std::multiset<Owner>> joint_owners_;  // one entry per joint and page
+  std::set<PendingYield> orphans_;          // held frames whose parent another partition removed
+  std::map<std::string, JointUse> joints_;  // by name
+  std::map<std::string, std::set<Owner>> contested_joints_;  // those that were reported
   std::uint64_t latest_lamport_time_ = 0;
   Absences absences_;
   // The latest incarnation of the own partition mentioned by others.

@@ -206,12 +206,12 @@ Result<std::vector<Part>> route_joints(const Directory& directory, const JointUp
   if (auto ok = check_stamp(update.stamp); !ok) return tl::unexpected(std::move(ok.error()));
   std::vector<Part> parts;
   for (const JointValue& joint : update.joints) {
-    const auto owners = directory.joint_owners(joint.name);
-    if (owners.empty()) return fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
+    const auto route = directory.route_joint(joint.name);
+    if (!route) return tl::unexpected(route.error());
     if (auto ok = check_value(joint); !ok) return tl::unexpected(ok.error());
-    for (const Owner owner : owners) {
+    for (const Owner owner : route->owners) {
       auto& body = body_for<JointUpdate>(parts, directory, owner, directory.name(owner));
-      body.joints.push_back(joint);
+      body.joints.push_back({route->name, joint.position, joint.variance});
       body.stamp = update.stamp;
     }
   }

@@ -65,8 +65,9 @@ struct LookupPlan {
                                                       const std::vector<EdgeUpdate>& edges,
                                                       std::optional<Time> stamp = std::nullopt);
 
-/// All owners of one of the joints, or of one that follows it, whether they are reachable or not.
-/// @return kUnknownJoint, kInvalidInput.
+/// The owners of the joints (Directory::route_joint()), whether they are reachable or not. Each gets
+/// the names that it knows.
+/// @return kUnknownJoint, kAmbiguousJoint, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_joints(const Directory& directory,
                                                      const JointUpdate& update);
 

@@ -306,7 +306,7 @@ Result<Change> decode_event(std::string_view message) {
   change.time = checked_time(reader.i64());
   change.stopped = reader.flag();
   if (!reader.good()) return invalid("events");
-  for (auto i = ChangeKind::kPartitionUp; i <= ChangeKind::kMissed;
+  for (auto i = ChangeKind::kPartitionUp; i <= ChangeKind::kJointConflict;
        i = static_cast<ChangeKind>(static_cast<int>(i) + 1)) {
     if (to_string(i) != kind) continue;
     change.kind = i;

@@ -52,10 +52,11 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   {
     const Lock lock(structure_.mutex);
     for (const JointValue& joint : update.joints) {
-      if (!structure_.directory.joint_owners(joint.name).empty()) {
+      auto route = structure_.directory.route_joint(joint.name);
+      if (route) {
         known.joints.push_back(joint);
       } else if (outcome) {
-        outcome = fail(Errc::kUnknownJoint, "no joint " + quote(joint.name));
+        outcome = tl::unexpected(std::move(route.error()));
       }
     }
     parts = route_joints(structure_.directory, known);

@@ -86,8 +86,9 @@ Outcome MemberRunner::take_outcome() {
     const bool own = change.partition == name_;
     const bool by_own = change.rival == name_;
     if (change.kind == ChangeKind::kConflict && own) log().error("{}", change.message);
-    if (change.kind == ChangeKind::kFrameOrphaned && (own || by_own))
-      log().warn("{}", change.message);
+    const bool warns =
+        change.kind == ChangeKind::kFrameOrphaned || change.kind == ChangeKind::kJointConflict;
+    if (warns && (own || by_own)) log().warn("{}", change.message);
   }
   // Posted here, to keep their order.
   if (!outcome.events.empty()) events_->post(std::move(outcome.events));

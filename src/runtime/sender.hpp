@@ -28,17 +28,27 @@ struct Destination {
   }
 };
 
+/// Where the values of an edge or joint go.
+struct Destinations {
+  std::string name{};  ///< that the owners know
+  std::vector<Destination> to{};
+  std::optional<Errc> none{};  ///< why there is none
+
+  friend bool operator==(const Destinations& a, const Destinations& b) {
+    return a.name == b.name && a.to == b.to && a.none == b.none;
+  }
+};
+
 /// What a sender needs of the participant.
 template <class Message>
 struct SenderLinks {
-  /// The current owners of each name; empty for one without an owner.
-  std::function<std::vector<std::vector<Destination>>(const std::vector<std::string>& names)> find;
+  /// The current owners of each name.
+  std::function<std::vector<Destinations>(const std::vector<std::string>& names)> find;
   std::function<std::unique_ptr<Channel<Message>>(const std::string& partition)> connect;
   /// Applies it to this process's own part. Must not wait or, on success, allocate.
   std::function<Result<void>(const Message&)> apply_here;
   /// Whether this process has lost its partition. Must not wait.
   std::function<bool()> out;
-  Errc unknown = Errc::kUnknownFrame;
 };
 
 /// A sender of any kind, for the thread that plans for all.
@@ -101,7 +111,7 @@ class Sender final : public PlannedSender {
     }
     Plan* plan = mailbox_.newest();
     if (!not_sent_.empty() || plan == nullptr) return not_sent_;
-    for (const std::size_t i : plan->unknown) list(i, links_.unknown, {});
+    for (const auto& [i, why] : plan->unroutable) list(i, why, {});
     for (Share& share : plan->shares) {
       auto& items = items_of(share.message);
       for (std::size_t k = 0; k < items.size(); ++k) fill(items[k], share.indices[k]);
@@ -130,7 +140,7 @@ class Sender final : public PlannedSender {
   };
   struct Plan {
     std::vector<Share> shares;
-    std::vector<std::size_t> unknown;
+    std::vector<std::pair<std::size_t, Errc>> unroutable;
   };
 
   static std::vector<EdgeUpdate>& items_of(Update& update) { return update.edges; }
@@ -146,14 +156,14 @@ class Sender final : public PlannedSender {
     return fresh;
   }
 
-  Plan plan_for(const std::vector<std::vector<Destination>>& found) const {
+  Plan plan_for(const std::vector<Destinations>& found) const {
     Plan plan;
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      if (found[i].empty()) plan.unknown.push_back(i);
-      for (const Destination& to : found[i]) {
+      if (found[i].none) plan.unroutable.emplace_back(i, *found[i].none);
+      for (const Destination& to : found[i].to) {
         Share& share = share_of(plan, to);
         items_of(share.message).push_back({});
-        set_name(items_of(share.message).back(), names_[i]);
+        set_name(items_of(share.message).back(), found[i].name);
         share.indices.push_back(i);
       }
     }
@@ -187,7 +197,7 @@ class Sender final : public PlannedSender {
   const std::vector<std::string> names_;
   const SenderLinks<Message> links_;
   Mutex planning_{LockRank::kPlanning};
-  std::vector<std::vector<Destination>> found_ TFDUDE_GUARDED_BY(planning_);
+  std::vector<Destinations> found_ TFDUDE_GUARDED_BY(planning_);
   bool planned_ TFDUDE_GUARDED_BY(planning_) = false;
   Mutex sending_{LockRank::kSending};
   bool closed_ = false;  // guarded by both mutexes

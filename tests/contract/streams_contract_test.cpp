@@ -175,6 +175,43 @@ TEST_CASE("streams: joint positions reach all owners and missing ones are named"
   CHECK(std::abs(yaw(arm.lookup("world", "upper")) - 0.5) < 1e-12);
 }
 
+TEST_CASE("streams: a joint of two partitions is not moved until its name says which") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const auto serve = [&](const std::string& name) {
+    return *Node::open(join(name), name,
+                       {{name + "_base", "", {}},
+                        moved_by(name + "_tip", name + "_base", revolute_named("elbow"))});
+  };
+  Node left = serve("left");
+  std::optional<Node> right = serve("right");
+  const auto turned = [](Node& node, double angle) {
+    const std::string& name = node.partition();
+    return std::abs(yaw(node.lookup(name + "_base", name + "_tip")) - angle) < 1e-12;
+  };
+  auto client = *Client::open(join(""));
+  auto bare = *client.stream_joints({"elbow"});
+  auto scoped = *client.stream_joints({"left/elbow", "right/elbow"});
+  REQUIRE(eventually([&] { return text(bare.try_publish({0.9}, {0})) == "0 ambiguous_joint"; }));
+  REQUIRE(eventually([&] { return scoped.try_publish({0.1, 0.2}, {0, 0}).empty(); }));
+  CHECK(eventually([&] { return turned(left, 0.1) && turned(*right, 0.2); }));
+
+  const auto published = client.publish_joints({"elbow"}, {0.9}, {0});
+  CHECK(outcome(published) == "ambiguous_joint");
+  CHECK(published.error().message.find("say 'left/elbow' or 'right/elbow'") != std::string::npos);
+  CHECK(outcome(client.update_joints({"elbow"}, {0.9}, {0})) == "ambiguous_joint");
+  CHECK(outcome(left.update_joints({"elbow"}, {0.9}, {0})) == "ambiguous_joint");
+  REQUIRE(client.update_joints({"left/elbow", "right/elbow"}, {0.3, 0.4}, {0, 0}));
+  CHECK((turned(left, 0.3) && turned(*right, 0.4)));
+  REQUIRE(client.publish_joints({"right/elbow"}, {0.5}, {0}));
+  CHECK(eventually([&] { return turned(*right, 0.5); }));
+  CHECK(turned(left, 0.3));
+  // Which robot was meant is not known only because one of them is away.
+  right.reset();
+  CHECK(outcome(client.update_joints({"elbow"}, {0.9}, {0})) == "ambiguous_joint");
+  REQUIRE(client.update_joints({"left/elbow"}, {0.6}, {0}));
+  CHECK(turned(left, 0.6));
+}
+
 TEST_CASE("streams: a stream that outlives its client sends nothing") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");

@@ -48,6 +48,27 @@ TEST_CASE("ros joints: joints without a usable position or name are counted") {
   CHECK(import.counts().refused == 5);
 }
 
+TEST_CASE("ros joints: positions go to the joints of the given partition") {
+  JointImportSettings settings;
+  settings.prefix = "r1_";
+  settings.partition = "left";
+  JointImport import(settings);
+  const auto taken = import.take({Time(), {"elbow"}, {1}});
+  REQUIRE(taken.joints.size() == 1);
+  CHECK(taken.joints[0].name == "left/r1_elbow");
+}
+
+TEST_CASE("ros joints: joints that several partitions have are not sent") {
+  JointExport out({});
+  JointState message;
+  out.add({joint("elbow", 1), joint("wrist", 2)}, message);
+  out.add({joint("elbow", 3)}, message);
+  CHECK(JointExport::drop_repeated(message) == std::set<std::string>{"elbow"});
+  CHECK(message.names == Names{"wrist"});
+  CHECK(message.positions == std::vector<double>{2});
+  CHECK(JointExport::drop_repeated(message).empty());
+}
+
 TEST_CASE("ros joints: measured joints are sent, unless a node of ROS publishes them") {
   JointExportSettings settings;
   settings.prefix = "r1/";

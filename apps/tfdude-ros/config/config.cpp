@@ -155,15 +155,19 @@ Result<void> Reader::tf_out(const YAML::Node& node, Settings& settings) const {
 }
 
 Result<void> Reader::joints_in(const YAML::Node& node, Settings& settings) const {
-  constexpr std::array<Keys, 4> kKeys = {"stddev", "stddev_of", "joints", "except"};
+  constexpr std::array<Keys, 5> kKeys = {"stddev", "stddev_of", "joints", "except", "partition"};
   const auto entries = fields(node, kKeys, "joints_in");
   if (!entries) return tl::unexpected(entries.error());
   JointImportSettings in;
   auto ok =
       within(*entries, "stddev", "joints_in", 0, kMaxStddev, in.stddev)
           .and_then([&] { return patterns(*entries, "joints", "joints_in", in.joints.include); })
-          .and_then([&] { return patterns(*entries, "except", "joints_in", in.joints.exclude); });
+          .and_then([&] { return patterns(*entries, "except", "joints_in", in.joints.exclude); })
+          .and_then([&] { return words(*entries, "partition", "joints_in", in.partition); });
   if (!ok) return ok;
+  if (const auto name = check_partition_name(in.partition); !in.partition.empty() && !name) {
+    return error(name.error().code, node.Mark(), "joints_in: " + name.error().message);
+  }
   if (const auto found = entries->find("stddev_of"); found != entries->end()) {
     const std::string what = "joints_in: stddev_of";
     const auto joints = fields(found->second.value, what);

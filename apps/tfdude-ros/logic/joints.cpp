@@ -1,6 +1,7 @@
 #include "joints.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "tfdude/base/id.hpp"
 
@@ -14,6 +15,7 @@ JointPositions JointImport::take(const JointState& message) {
   for (std::size_t i = 0; i < message.names.size(); ++i) {
     const std::string& name = message.names[i];
     if (!settings_.joints.takes(name)) continue;
+    const std::string scope = settings_.partition.empty() ? "" : settings_.partition + "/";
     std::string id = settings_.prefix + name;
     const bool good = i < message.positions.size() && is_position(message.positions[i]) &&
                       check_id(id, "joint") && seen.insert(id).second;
@@ -23,7 +25,7 @@ JointPositions JointImport::take(const JointState& message) {
     }
     const auto own = settings_.stddev_of.find(name);
     const auto stddev = own == settings_.stddev_of.end() ? settings_.stddev : own->second;
-    JointValue joint{std::move(id), message.positions[i]};
+    JointValue joint{scope + id, message.positions[i]};
     if (stddev) joint.variance = *stddev * *stddev;
     out.joints.push_back(std::move(joint));
     ++counts_.taken;
@@ -46,6 +48,24 @@ void JointExport::add(const std::vector<JointInfo>& joints, JointState& message)
     message.names.push_back(*std::move(name));
     message.positions.push_back(joint.position);
   }
+}
+
+std::set<std::string> JointExport::drop_repeated(JointState& message) {
+  std::map<std::string, int> count;
+  for (const std::string& name : message.names) ++count[name];
+  JointState once;
+  std::set<std::string> repeated;
+  for (std::size_t i = 0; i < message.names.size(); ++i) {
+    if (count[message.names[i]] > 1) {
+      repeated.insert(message.names[i]);
+      continue;
+    }
+    once.names.push_back(message.names[i]);
+    once.positions.push_back(message.positions[i]);
+  }
+  message.names = std::move(once.names);
+  message.positions = std::move(once.positions);
+  return repeated;
 }
 
 }  // namespace tfdude::ros

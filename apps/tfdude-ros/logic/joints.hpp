@@ -21,6 +21,7 @@ struct JointImportSettings {
   std::map<std::string, double> stddev_of{};  ///< by the name in ROS, for joints with another one
   Choice joints{};                            ///< by the names in ROS
   std::string prefix{};
+  std::string partition{};  ///< the only one whose joints are meant; empty: any
 };
 
 struct JointCounts {
@@ -66,6 +67,10 @@ class JointExport {
 
   /// Adds the joints that were measured, and are not published by others.
   void add(const std::vector<JointInfo>& joints, JointState& message) const;
+
+  /// Removes the joints whose names several partitions have: a listener could not tell them apart.
+  /// @return their names
+  [[nodiscard]] static std::set<std::string> drop_repeated(JointState& message);
 
  private:
   JointExportSettings settings_;

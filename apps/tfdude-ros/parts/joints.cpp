@@ -5,6 +5,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "tfdude/base/id.hpp"
+
 namespace tfdude::ros {
 
 Result<void> JointsIn::start(RosDomain& domain, const IsNeighbour& is_own) {
@@ -58,6 +60,11 @@ void JointsOut::send() {
   for (const PartitionInfo& one : *partitions) {
     if (!one.reachable || !export_.settings().partitions.match(one.name)) continue;
     if (const auto joints = node_.joints(one.name)) export_.add(*joints, message);
+  }
+  for (const std::string& name : JointExport::drop_repeated(message)) {
+    if (!told_.insert(name).second) continue;
+    spdlog::warn("joints to ROS: joint {} is not sent: several of the chosen partitions have it",
+                 quote(name));
   }
   if (message.names.empty()) return;
   const auto now = node_.now();

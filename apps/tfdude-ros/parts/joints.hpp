@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "tfdude/client/node.hpp"
@@ -48,7 +49,8 @@ class JointsOut {
   Node& node_;
   JointExport export_;
   std::unique_ptr<Publisher> publisher_;
-  cli::Worker worker_;  // last: it uses the other members
+  std::set<std::string> told_;  // the joints that are not sent
+  cli::Worker worker_;          // last: it uses the other members
 };
 
 }  // namespace tfdude::ros

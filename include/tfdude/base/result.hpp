@@ -39,6 +39,7 @@ enum class Errc : std::uint8_t {
   kUnsupported = 23,       ///< an earlier version does not know what was sent to it
   kNotPermitted = 24,      ///< the keys of this participant, or the lack of keys, do not allow it
   kTooMuch = 25,           ///< a limit of the partition is reached; the message names it
+  kAmbiguousJoint = 26,    ///< several partitions have a joint of that name: say PARTITION/JOINT
 };
 
 /// The stable snake_case name of a code, as the command line prints it in JSON.

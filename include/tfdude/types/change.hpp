@@ -21,7 +21,8 @@ enum class ChangeKind : std::uint8_t {
   kFrameOrphaned,  ///< waits for its parent, which the parent's configuration no longer names
   /// Now belongs to a reachable partition, since its former owner is not reachable.
   kFrameTakenOver,
-  kMissed,  ///< changes were not reported, because the listeners took too long
+  kMissed,         ///< changes were not reported, because the listeners took too long
+  kJointConflict,  ///< two partitions have a joint of one name
 };
 
 /// The stable snake_case name of a kind, as the command line prints it in JSON.
@@ -34,12 +35,13 @@ struct Change {
   std::string frame;      ///< empty if the change concerns a partition
   std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
   /// For a conflict: the partition that kept its claim. For an orphan: the former owner of its
-  /// parent. For a frame taken over: its former owner.
+  /// parent. For a frame taken over: its former owner. For a joint of one name: the other partition.
   std::string rival;
   std::string message;  ///< human-readable
   Time time{};          ///< by the clock of the participant that saw it
   /// For a partition that is down: it announced its stop; otherwise it was lost.
   bool stopped = false;
+  std::string joint{};  ///< of a conflict of joints
 };
 
 }  // namespace tfdude

@@ -11,6 +11,7 @@ namespace tfdude {
 struct NotSent {
   std::size_t index = 0;  ///< position in the list that the stream was opened with
   /// - kUnknownFrame, kUnknownJoint: this process knows no owner (yet).
+  /// - kAmbiguousJoint: several partitions have a joint of that name: open it as PARTITION/JOINT.
   /// - kUnreachable: the owner is known to be down.
   /// - kTimeout: the owner was not discovered yet, or cannot be sent the value at once.
   /// - kNotPermitted: the keys of this process do not allow it.

@@ -41,6 +41,7 @@ constexpr Named kCodes[] = {
     {Errc::kUnsupported, 23, "unsupported"},
     {Errc::kNotPermitted, 24, "not_permitted"},
     {Errc::kTooMuch, 25, "too_much"},
+    {Errc::kAmbiguousJoint, 26, "ambiguous_joint"},
 };
 
 TEST_CASE("codes keep their numbers and names") {

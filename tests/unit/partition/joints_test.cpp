@@ -400,8 +400,8 @@ TEST_CASE("an owner's pages list the joints that move its frames") {
   CHECK(joints() == Listed{{"rail", ""}, {"elbow", ""}, {"wrist", "elbow"}, {"shoulder", ""}});
   (void)arm.partition.answer(Request{1, "hand", MoveRequest{"base", {}}}, kNow);
   CHECK(joints() == Listed{{"rail", ""}, {"elbow", ""}, {"shoulder", ""}});
-  CHECK(arm.directory.joint_owners("wrist").empty());
-  CHECK(arm.directory.joint_owners("elbow").size() == 1);
+  CHECK(outcome(arm.directory.route_joint("wrist")) == "unknown_joint");
+  CHECK(arm.directory.route_joint("elbow").value().owners.size() == 1);
 }
 
 }  // namespace

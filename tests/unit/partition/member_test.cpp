@@ -89,7 +89,8 @@ TEST_CASE("member: joints that appear or vanish with a restart change plans") {
   Replica replica;
   Member member(replica.forest, replica.directory, "");
   const auto owners = [&](const char* joint) {
-    return replica.directory.joint_owners(joint).size();
+    const auto route = replica.directory.route_joint(joint);
+    return route ? route->owners.size() : 0;
   };
   const auto input = [&](auto give) {
     const auto before = std::pair(owners("pan"), owners("tilt"));
