@@ -19,8 +19,8 @@ struct Terminal {
 [[nodiscard]] Terminal& terminal();
 
 /// What an open file is. A terminal is as wide as the environment's COLUMNS says, or as it says
-/// itself; a file that is none is of kUnlimited columns. Without colours if the environment's NO_COLOR is not empty, or TERM is
-/// "dumb".
+/// itself; a file that is none is of kUnlimited columns. Without colours if the environment's
+/// NO_COLOR is not empty, or TERM is "dumb".
 [[nodiscard]] Terminal terminal_of(int file);
 
 /// What a text is, not how it looks.

@@ -41,7 +41,8 @@ Result<FrameSpec> frame(const UrdfTree& tree, const UrdfTree::Link& link,
                         const std::vector<UrdfEdge>& edges, const UrdfPart& part) {
   FrameSpec spec;
   spec.id = part.prefix + link.name;
-  if (auto ok = check_new_id(spec.id, "name"); !ok) return link_error(tree, link, ok.error().message);
+  if (auto ok = check_new_id(spec.id, "name"); !ok)
+    return link_error(tree, link, ok.error().message);
   if (!link.joint) {
     spec.parent = part.root;
     if (!part.root.empty()) spec.X_PC = part.X_root;

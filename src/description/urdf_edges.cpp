@@ -119,7 +119,8 @@ Result<void> EdgeReader::read(Index i) {
   }
   JointSpec joint;
   joint.name = part_.prefix + urdf.name;
-  if (auto ok = check_new_id(joint.name, "name"); !ok) return tree_.joint_error(i, ok.error().message);
+  if (auto ok = check_new_id(joint.name, "name"); !ok)
+    return tree_.joint_error(i, ok.error().message);
   joint.type = *type;
   joint.strict = part_.strict_limits;
   auto ok = read_motion(i, joint).and_then([&] { return read_limits(i, joint); }).and_then([&] {

@@ -65,8 +65,8 @@ struct LookupPlan {
                                                       const std::vector<EdgeUpdate>& edges,
                                                       std::optional<Time> stamp = std::nullopt);
 
-/// The owners of the joints (Directory::route_joint()), whether they are reachable or not. Each gets
-/// the names that it knows.
+/// The owners of the joints (Directory::route_joint()), whether they are reachable or not. Each
+/// gets the names that it knows.
 /// @return kUnknownJoint, kAmbiguousJoint, kInvalidInput.
 [[nodiscard]] Result<std::vector<Part>> route_joints(const Directory& directory,
                                                      const JointUpdate& update);

@@ -35,7 +35,7 @@ struct Change {
   std::string frame;      ///< empty if the change concerns a partition
   std::string parent;     ///< of an added, moved or orphaned frame; empty: a root
   /// For a conflict: the partition that kept its claim. For an orphan: the former owner of its
-  /// parent. For a frame taken over: its former owner. For a joint of one name: the other partition.
+  /// parent. For a frame taken over: its former owner. For joints of one name: the other owner.
   std::string rival;
   std::string message;  ///< human-readable
   Time time{};          ///< by the clock of the participant that saw it

@@ -115,7 +115,8 @@ Result<ReviseRequest> read_revise(const wire::ReviseBody& body) {
     ReviseRequest::Edge edge{string_of(in.id()), innovation, in.refused() != 0, {}};
     if (!std::isfinite(innovation.squares + innovation.expected + innovation.variance)) {
       return fail(Errc::kInvalidInput,
-                  "frame " + quote(edge.id) + ": its normalized innovation is not a finite number, or too large");
+                  "frame " + quote(edge.id) +
+                      ": its normalized innovation is not a finite number, or too large");
     }
     if (in.revised() != 0) {
       auto X_PC = read_computed(in.x_pc());

@@ -316,14 +316,6 @@ TEST_CASE("an invalid value is rejected by field") {
                  "robot.yaml:4: frame 'camera': parent is empty"});
   check_refused({"frames: [{id: \"a\\nb\"}]", Errc::kInvalidInput,
                  "robot.yaml:1: frames[0]: id 'a\\x0ab' holds a control character"});
-  check_refused({"frames: [{id: ' a'}]", Errc::kInvalidInput,
-                 "robot.yaml:1: frames[0]: id ' a' begins with a space"});
-  check_refused({camera("    parent: 'a '"), Errc::kInvalidInput,
-                 "robot.yaml:4: frame 'camera': parent 'a ' ends with a space"});
-  check_refused({camera("    sources: {'supply ': [[0, 0, 0, 0, 0, 1]]}"), Errc::kInvalidInput,
-                 "robot.yaml:4: frame 'camera': source 'supply ' ends with a space"});
-  check_refused(
-      {"partition: ' a'", Errc::kInvalidInput, "robot.yaml:1: partition ' a' begins with a space"});
   check_refused({"frames: [{id: a\xff}]", Errc::kInvalidInput,
                  "robot.yaml:1: frames[0]: id 'a\\xff' is not valid UTF-8"});
   check_refused({"partition: 'a*'", Errc::kInvalidInput,
