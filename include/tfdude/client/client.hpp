@@ -146,11 +146,11 @@ class TFDUDE_EXPORT Client {
   /// poses and covariances (joint_transform()) of all joints of the call in one commit; joints that
   /// mimic another move with it. All samples have the same stamp, as for update(). If one owner
   /// cannot be reached, the others get their shares all the same.
+  /// @param names  PARTITION/JOINT where several partitions have a joint of one name
   /// @param positions  one per name [rad or m]
-  /// @param variances  of the positions [rad² or m²]; none: unspecified, as those of the edges then
-  ///   are
-  /// @return kUnknownJoint, kInvalidInput (naming the joint: not a number, a negative variance; or
-  ///   not one of each per name).
+  /// @param variances  of the positions [rad² or m²]; none: unspecified, and so are the edges
+  /// @return kUnknownJoint, kAmbiguousJoint, kInvalidInput (naming the joint: not a number, a
+  ///   negative variance; or not one of each per name).
   [[nodiscard]] Result<void> publish_joints(const std::vector<std::string>& names,
                                             const std::vector<double>& positions,
                                             const std::vector<double>& variances = {},

@@ -56,8 +56,8 @@ class TFDUDE_EXPORT EdgeStream {
   std::shared_ptr<Sender<Update>> sender_;
 };
 
-/// As EdgeStream, for joint positions, as Client::publish_joints() does. If several partitions have
-/// a joint, it is listed if one of them was not sent it. Joints of this process's own partition are
+/// As EdgeStream, for joint positions, as Client::publish_joints() does. If a joint of another
+/// partition mimics one, that is listed if one of them was not sent it. Joints of this process's own partition are
 /// applied under a lock shared with the receiving threads; if that is taken, their share fails with
 /// kTimeout instead of waiting.
 class TFDUDE_EXPORT JointStream {
