@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "tfdude/types/frame.hpp"
+
 #include "partition/directory.hpp"
 #include "tree/forest.hpp"
 

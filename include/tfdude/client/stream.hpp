@@ -57,9 +57,9 @@ class TFDUDE_EXPORT EdgeStream {
 };
 
 /// As EdgeStream, for joint positions, as Client::publish_joints() does. If a joint of another
-/// partition mimics one, that is listed if one of them was not sent it. Joints of this process's own partition are
-/// applied under a lock shared with the receiving threads; if that is taken, their share fails with
-/// kTimeout instead of waiting.
+/// partition mimics one, that is listed if one of them was not sent it. Joints of this process's
+/// own partition are applied under a lock shared with the receiving threads; if that is taken,
+/// their share fails with kTimeout instead of waiting.
 class TFDUDE_EXPORT JointStream {
  public:
   explicit JointStream(std::shared_ptr<Sender<JointUpdate>> sender);
