@@ -26,6 +26,7 @@ DDS_FOLDERS = (DDS_FOLDER, ROS_DDS_FOLDER)
 SHARED = {
     ROS_DDS_FOLDER: ("src/transport/fastdds/compat.hpp", "src/transport/fastdds/cdr_check.hpp"),
     "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp"),
+    "apps/tfdude-ros/logic/": ("src/types/ros_rules.hpp",),
 }
 
 # (what, pattern of the include, folders or files that may include it)

@@ -106,6 +106,9 @@ struct Arguments {
 [[nodiscard]] std::optional<Time> present(Source source, const Arguments& arguments,
                                           const PartitionInfo& partition);
 
+/// The line with the stamp of a transform on the path between `id` and `other`.
+[[nodiscard]] std::string stamp_line(Source source, const Arguments& arguments, Time stamp);
+
 /// Reads a stamp of the command line: decimal seconds since the epoch, exact to nanoseconds. A
 /// negative number counts back from now. @return kInvalidInput naming the text.
 [[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);

@@ -82,7 +82,7 @@ int run_point(Source source, const Arguments& arguments) {
             (arguments.direction ? "\n" : " [m²]\n") + rows_text(joint);
   }
   if (X_AB->stamp && !arguments.json) {
-    text += describe_stamp(X_AB->stamp, present(source, arguments, arguments.id, arguments.other));
+    text += stamp_line(source, arguments, *X_AB->stamp);
   }
   return answer(arguments, json, text + describe(X_AB->basis));
 }

@@ -27,6 +27,7 @@ nlohmann::json json_of(const Recording& recording, const std::string& file) {
                       {"foreign", summary.foreign},
                       {"finished", summary.finished},
                       {"chunks", summary.chunks},
+                      {"left_out", summary.left_out.value_or(0)},
                       {"problems", summary.problems},
                       {"partitions", nlohmann::json::array()}};
   json["messages"] = summary.messages ? nlohmann::json(*summary.messages) : nlohmann::json();
@@ -68,6 +69,9 @@ std::string describe(const Recording& recording) {
     if (joints && !joints->empty()) text += ", " + std::to_string(joints->size()) + " joints";
     text += partition.reachable ? "\n" : ", not reachable at the end\n";
   }
+  if (summary.left_out.value_or(0) > 0) {
+    text += "left out     " + std::to_string(*summary.left_out) + " invalid transforms\n";
+  }
   for (const std::string& problem : summary.problems) {
     text += "problem      " + printable(problem) + "\n";
   }
@@ -86,8 +90,9 @@ Result<Time> beginning(Recording& recording, const Arguments& arguments) {
 
 int run_info(const Arguments& arguments) {
   const std::string& file = arguments.recording.file;
-  const auto recording = Recording::open(file);
+  auto recording = Recording::open(file);
   if (!recording) return report(recording.error(), arguments);
+  if (recording->summary().foreign) recording->read_all();
   return answer(arguments, json_of(*recording, file), describe(*recording));
 }
 

@@ -56,9 +56,12 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
       spec.X_PC = known[i]->X_PC;
       spec.correlation = replayed(known[i]->correlation);
       edge.correlation = spec.correlation;
-      if (known[i]->begins && known[i]->begins->upper() != Covariance::Upper{}) {
+      const bool unsampled = known[i]->unsampled;
+      const Covariance noise = known[i]->begins.value_or(Covariance());
+      if (unsampled || noise.upper() != Covariance::Upper{}) {
         spec.timing = options.history;
-        spec.timing->process_noise = *known[i]->begins;
+        spec.timing->process_noise = noise;
+        spec.timing->moving = unsampled;
       }
     }
     if (!can_serve(spec)) {
@@ -177,6 +180,11 @@ Result<void> ReplayedPartition::take(const ValuesNews& values) {
     stamp_ = value.stamp;
     if (value.cleared) {
       clear(frame.id, value, edge);
+      continue;
+    }
+    // What it was opened with is that of no instant either; later it has no value at all.
+    if (value.unsampled) {
+      if (edge.dynamic) clear(frame.id, value, edge);
       continue;
     }
     if (value.begins) begin(frame, value, edge);

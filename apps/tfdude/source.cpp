@@ -14,6 +14,14 @@ Result<Time> Source::present() const {
   return client_ != nullptr ? client_->now() : recording_->instant();
 }
 
+std::optional<Time> Source::end_for(Time stamp) const {
+  // A sample may be older than the recording.
+  constexpr std::chrono::hours kDay{24};
+  const auto start = recording_->summary().start;
+  if (!start || stamp < *start - kDay || stamp > end_ + kDay) return std::nullopt;
+  return end_;
+}
+
 Result<std::vector<Frame>> Source::frames() const {
   if (client_ != nullptr) return client_->frames();
   return recording_->frames();

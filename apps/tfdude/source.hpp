@@ -24,6 +24,9 @@ class Source {
   [[nodiscard]] Result<Time> now() const;
   /// The time to compare stamps with: of a recording, the instant that it shows.
   [[nodiscard]] Result<Time> present() const;
+  /// The end of a recording, to say how long before it a stamp is; absent if that is of another
+  /// clock.
+  [[nodiscard]] std::optional<Time> end_for(Time stamp) const;
 
   // As the functions of Client.
   [[nodiscard]] Result<std::vector<Frame>> frames() const;

@@ -163,6 +163,11 @@ std::optional<Time> present(Source source, const Arguments& arguments,
   return now ? std::optional<Time>(*now) : std::nullopt;
 }
 
+std::string stamp_line(Source source, const Arguments& arguments, Time stamp) {
+  if (!source.live()) return describe_recorded_stamp(stamp, source.end_for(stamp));
+  return describe_stamp(stamp, present(source, arguments, arguments.id, arguments.other));
+}
+
 Order order_of(const Arguments& arguments) {
   return arguments.order == 4 ? Order::kFourth : Order::kSecond;
 }
@@ -194,7 +199,7 @@ int follow_lookup(Client& client, const Arguments& arguments) {
     const auto now = present(client, arguments, arguments.id, arguments.other);
     std::string text = arguments.other + " in " + arguments.id + "\n" +
                        describe(X_AB, shown_by(arguments), X_AB.basis.unspecified);
-    if (X_AB.stamp) text += describe_stamp(X_AB.stamp, now);
+    if (X_AB.stamp) text += describe_stamp(*X_AB.stamp, now);
     screen.redraw(text + describe(X_AB.basis));
   });
 }
@@ -204,7 +209,7 @@ int run_lookup(Source source, const Arguments& arguments) {
   if (!X_AB) return refuse(source, X_AB.error(), arguments);
   std::string text = describe(*X_AB, shown_by(arguments), X_AB->basis.unspecified);
   if (X_AB->stamp && !arguments.json) {
-    text += describe_stamp(X_AB->stamp, present(source, arguments, arguments.id, arguments.other));
+    text += stamp_line(source, arguments, *X_AB->stamp);
   }
   text += describe(X_AB->basis);
   return answer(arguments, arguments.json ? path_json(source, arguments, *X_AB) : nlohmann::json(),
@@ -225,7 +230,7 @@ int run_watch(Client& client, const Arguments& arguments) {
   return follow(client, arguments, [&](const StampedTransform& X_AB) {
     std::string text = describe(X_AB, shown_by(arguments), X_AB.basis.unspecified);
     if (X_AB.stamp && !arguments.json) {
-      text += describe_stamp(X_AB.stamp, present(client, arguments, arguments.id, arguments.other));
+      text += stamp_line(client, arguments, *X_AB.stamp);
     }
     (void)answer(arguments, arguments.json ? path_json(client, arguments, X_AB) : nlohmann::json(),
                  text);
@@ -250,13 +255,19 @@ int run_history(Client& client, const Arguments& arguments) {
   if (histories->empty() || !histories->front().newest) {
     const std::uint64_t refused = histories->empty() ? 0 : histories->front().refused_ahead;
     const auto parent = client.parent(arguments.id);
-    const auto X_PC = parent ? client.lookup(*parent, arguments.id) : Result<Transform>();
-    const bool cleared = !X_PC && X_PC.error().code == Errc::kNotYet;
+    const auto lacks_sample = [&](const Query& query) {
+      const auto X_PC = parent ? client.lookup(*parent, arguments.id, query) : StampedTransform();
+      return !X_PC && X_PC.error().code == Errc::kNotYet;
+    };
+    // At any instant.
+    const bool dynamic = lacks_sample({Time{}, {}, {}});
+    const bool cleared = dynamic && lacks_sample({});
     const nlohmann::json json{
-        {"id", arguments.id}, {"moving", cleared}, {"samples", 0}, {"refused_ahead", refused}};
-    std::string text = arguments.id + (cleared ? " is dynamic: no sample since its history was "
-                                                 "cleared\n"
-                                               : " is static: it holds for all times\n");
+        {"id", arguments.id}, {"moving", dynamic}, {"samples", 0}, {"refused_ahead", refused}};
+    std::string text = arguments.id + (cleared   ? " is dynamic: no sample since its history was "
+                                                   "cleared\n"
+                                       : dynamic ? " is dynamic: no sample yet\n"
+                                                 : " is static: it holds for all times\n");
     if (refused > 0) text += "rejected     " + std::to_string(refused) + " too far ahead\n";
     return answer(arguments, json, text);
   }

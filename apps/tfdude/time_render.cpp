@@ -32,9 +32,16 @@ std::string seconds_of(Time stamp) {
                 static_cast<long long>(ns % kSecond));
 }
 
-std::string describe_stamp(const std::optional<Time>& stamp, std::optional<Time> now) {
-  if (!stamp) return "stamp        none: holds for all times\n";
-  return "stamp        " + seconds_of(*stamp) + "  (" + ago(*stamp, now) + ")\n";
+std::string describe_stamp(Time stamp, std::optional<Time> now) {
+  return "stamp        " + seconds_of(stamp) + "  (" + ago(stamp, now) + ")\n";
+}
+
+std::string describe_recorded_stamp(Time stamp, std::optional<Time> end) {
+  if (!end) return describe_stamp(stamp, end);
+  const double age = seconds(*end - stamp);
+  const std::string when =
+      age < 0 ? format("%.6f s after the end", -age) : format("%.6f s before the end", age);
+  return "stamp        " + seconds_of(stamp) + "  (" + when + ")\n";
 }
 
 void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp) {

@@ -19,7 +19,9 @@ namespace tfdude::cli {
 // Without `now`, ages are not known: the stamps are of another clock.
 
 /// The line with the stamp of a transform.
-[[nodiscard]] std::string describe_stamp(const std::optional<Time>& stamp, std::optional<Time> now);
+[[nodiscard]] std::string describe_stamp(Time stamp, std::optional<Time> now);
+/// The same of a recording, which has no present.
+[[nodiscard]] std::string describe_recorded_stamp(Time stamp, std::optional<Time> end);
 
 /// Adds `stamp` [s] and `stamp_ns` to a transform's JSON; both are null if it holds for all times.
 void add_stamp(nlohmann::json& json, const std::optional<Time>& stamp);

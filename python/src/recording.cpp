@@ -125,6 +125,12 @@ void bind_instant(RecordingClass& cls) {
         return shared.call([](Recording& recording) { return recording.summary(); });
       },
       "What the recording contains, and what is wrong with it.");
+  cls.def(
+      "read_all",
+      [](SharedRecording& shared) {
+        shared.call([](Recording& recording) { recording.read_all(); });
+      },
+      "Reads the whole file, so that the summary knows all that is wrong with it.");
 }
 
 }  // namespace
@@ -143,7 +149,9 @@ void bind_recording(py::module_& module) {
       .def_readonly("bytes", &RecordingSummary::bytes)
       .def_readonly("chunks", &RecordingSummary::chunks)
       .def_readonly("messages", &RecordingSummary::messages, "None: not known without reading.")
-      .def_readonly("problems", &RecordingSummary::problems, "What is wrong with the file.");
+      .def_readonly("problems", &RecordingSummary::problems, "What is wrong with the file.")
+      .def_readonly("left_out", &RecordingSummary::left_out,
+                    "Invalid transforms of ROS; None: call read_all() to know.");
   RecordingClass cls(
       module, "Recording",
       "A file of `tfdude record`, or an MCAP file with transforms of ROS, which is asked as a\n"

@@ -39,6 +39,8 @@ std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<S
     if (!left_of(*known->second->joint, state.joints)) continue;
     frame.X_PC = value_of(as_left(*known->second, joints));
     frame.correlation.observed.reset();
+    // Its initial position is no sample.
+    if (!left_of(*known->second->joint, joints)) frame.time = {};
   }
   return frames;
 }
@@ -97,7 +99,7 @@ bool Partition::hang_again(const StoredFrame& frame) {
     added = add();
   }
   if (!added) return false;
-  if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
+  (void)forest_.resume(frame.id, frame.correlation, frame.time);
   put(frame.id, frame.parent, frame.lamport_time);
   return true;
 }
@@ -105,7 +107,7 @@ bool Partition::hang_again(const StoredFrame& frame) {
 void Partition::make_root(const StoredFrame& frame, Time now) {
   const std::uint64_t lamport_time = directory_.next_lamport_time(now);
   if (!forest_.add(frame.id, {}, frame.X_PC, Forest::MissingParent::kAllow, lamport_time)) return;
-  if (!frame.correlation.empty()) (void)forest_.resume(frame.id, frame.correlation);
+  (void)forest_.resume(frame.id, frame.correlation, frame.time);
   put(frame.id, {}, lamport_time);
   tell_conflict({frame.id, lamport_time, Tombstone::Kind::kUnhung, name_});
 }
@@ -248,8 +250,8 @@ StateChange Partition::take_unsaved(bool values_due) {
     const auto place = pages_.place(id);
     auto edge = forest_.kept(id);
     if (!place || !edge) continue;
-    change.frames.push_back(
-        {id, place->parent, edge->X_PC, place->lamport_time, std::move(edge->correlation)});
+    change.frames.push_back({id, place->parent, edge->X_PC, place->lamport_time,
+                             std::move(edge->correlation), edge->time});
   }
   // The first change of a process stores its incarnation, too, since the epoch is above it.
   auto absent = directory_.absent();

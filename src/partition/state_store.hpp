@@ -18,6 +18,7 @@ struct StoredFrame {
   Transform X_PC;      ///< if the edge is correlated, the covariance is that of its own part
   std::uint64_t lamport_time = 0;
   StoredCorrelation correlation{};
+  StoredTime time{};
 };
 
 /// A joint's position at its last sample.

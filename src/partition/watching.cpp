@@ -42,6 +42,7 @@ std::vector<PushedValue> entries_of(const SegmentValues& found) {
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
     entries.back().cleared = found.cleared;
+    entries.back().unsampled = found.unsampled;
     // As for an edge: if one edge of a segment is unspecified, the segment is.
     StatedCovariance& covariance = entries.back().X.covariance;
     if (!covariance.complete()) covariance = StatedCovariance::unspecified();
@@ -212,7 +213,8 @@ bool WatchedGroup::begins(const PushedValue& entry) const {
 bool WatchedGroup::is_new(const PushedValue& entry) const {
   const auto& sent = sent_[entry.index];
   return begins(entry) || entry.stamp != sent->stamp || entry.cleared != sent->cleared ||
-         !(entry.correlation == sent->correlation) || !same(entry.X, sent->X);
+         entry.unsampled != sent->unsampled || !(entry.correlation == sent->correlation) ||
+         !same(entry.X, sent->X);
 }
 
 PushedValues WatchedGroup::next_composed_push(const Forest& forest) {

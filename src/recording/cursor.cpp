@@ -76,6 +76,7 @@ void Cursor::begin_at(std::size_t chunk) {
 }
 
 void Cursor::rewind() {
+  left_out_ = 0;
   statics_before_.reset();
   begin_at(0);
 }
@@ -150,13 +151,16 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
     case Topic::kTf:
     case Topic::kTfStatic: {
       if (!foreign_) return {};
-      auto values = decode_tf(message.data);
-      if (!values) return tl::unexpected(std::move(values.error()));
+      auto transforms = decode_tf(message.data);
+      if (!transforms) return tl::unexpected(std::move(transforms.error()));
       if (topic == Topic::kTfStatic) {
-        for (RecordedValue& value : *values) value.value.stamp.reset();
+        for (RecordedValue& value : transforms->values) value.value.stamp.reset();
       }
+      left_out_ += transforms->left_out.size();
+      for (std::string& why : transforms->left_out) note(std::move(why));
       waiting_.push_back(
-          {log_of(message), RecordedValues{kForeignPartition, 0, false, *std::move(values)}, true});
+          {log_of(message),
+           RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)}, true});
       return {};
     }
     case Topic::kKeyframe:

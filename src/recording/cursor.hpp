@@ -38,6 +38,9 @@ class Cursor {
   /// What is wrong with the file, as far as it was read.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
+  /// How many invalid transforms of a foreign file were left out since the last start or rewind.
+  [[nodiscard]] std::size_t left_out() const { return left_out_; }
+
   /// Goes to the last place, not later than an instant, from which everything is known without
   /// what is before. In a foreign file, transforms that were sent regularly are then left out
   /// before that instant.
@@ -73,6 +76,7 @@ class Cursor {
   std::map<std::uint16_t, Topic> topics_;
   std::size_t topics_known_ = 0;  // channels that were looked at
   std::vector<std::string> problems_;
+  std::size_t left_out_ = 0;
   std::optional<Topic> only_;
   std::size_t first_chunk_ = 0;
   std::optional<Time> statics_before_;

@@ -22,6 +22,13 @@ tl::unexpected<Error> invalid(const char* what) {
 // Instead of a stamp.
 constexpr std::int64_t kAlways = -1;
 constexpr std::int64_t kCleared = -2;
+constexpr std::int64_t kUnsampled = -3;
+
+std::int64_t stamp_of(const WatchedValue& value) {
+  if (value.cleared) return kCleared;
+  if (value.unsampled) return kUnsampled;
+  return value.stamp ? nanoseconds(*value.stamp) : kAlways;
+}
 
 enum class CovarianceIs : std::uint8_t { kGiven = 0, kUnspecified = 1, kAsBefore = 2 };
 
@@ -102,7 +109,7 @@ void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, boo
   ++count_;
   writer_.text(edge.id);
   writer_.text(edge.parent);
-  writer_.i64(value.cleared ? kCleared : value.stamp ? nanoseconds(*value.stamp) : kAlways);
+  writer_.i64(stamp_of(value));
   const StatedCovariance& covariance = value.X_PC.covariance;
   const CovarianceIs is = !covariance.complete() ? CovarianceIs::kUnspecified
                           : as_before            ? CovarianceIs::kAsBefore
@@ -134,7 +141,7 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   const bool begins = reader.flag();
   Flat flat{};
   for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
-  bool valid = is_edge(recorded.edge) && stamp >= kCleared && stamp <= kMaxTime;
+  bool valid = is_edge(recorded.edge) && stamp >= kUnsampled && stamp <= kMaxTime;
   const auto upper = upper_of(reader, valid);
   const auto noise = upper_of(reader, valid);
   recorded.value.correlation = correlation_of(reader, valid);
@@ -155,6 +162,7 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   recorded.value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
   if (stamp >= 0) recorded.value.stamp = time_of(stamp);
   recorded.value.cleared = stamp == kCleared;
+  recorded.value.unsampled = stamp == kUnsampled;
   if (!begins) return recorded;
   recorded.value.begins.emplace();
   if (noise) {

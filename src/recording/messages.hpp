@@ -112,8 +112,13 @@ class TfEncoder {
   std::uint32_t count_ = 0;
 };
 
-/// The values of a TFMessage, whose covariance is unspecified; invalid transforms are left out.
-/// @return kState: not a valid message
-[[nodiscard]] Result<std::vector<RecordedValue>> decode_tf(std::string_view message);
+/// The transforms of a TFMessage.
+struct RecordedTransforms {
+  std::vector<RecordedValue> values;  ///< their covariance is unspecified
+  std::vector<std::string> left_out;  ///< of each invalid transform, what is wrong with it
+};
+
+/// By the rules of the bridge to ROS. @return kState: not a valid message
+[[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message);
 
 }  // namespace tfdude::recording

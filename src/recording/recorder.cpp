@@ -15,7 +15,9 @@ std::size_t place_of(const std::vector<WatchedFrame>& frames, const WatchedFrame
 }
 
 // Whether it holds for all times.
-bool is_static(const WatchedValue& value) { return !value.stamp && !value.cleared; }
+bool is_static(const WatchedValue& value) {
+  return !value.stamp && !value.cleared && !value.unsampled;
+}
 
 }  // namespace
 
@@ -60,7 +62,8 @@ Result<void> Recorder::change(const std::string& name, Known& known, const Frame
     const std::size_t place = place_of(before, frame);
     const bool there = place < before.size() && before[place].id == frame.id;
     if (there) stays[place] = true;
-    const bool same = there && before[place] == frame;
+    // The values of an earlier process are not those of this one.
+    const bool same = there && before[place] == frame && !changed.complete;
     if (same) known.edges[i] = std::move(edges[place]);
     if (!same || changed.complete) changed.frames.push_back(frame);
   }
@@ -100,6 +103,7 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     newest.X_PC = value.X_PC;
     newest.correlation = value.correlation;
     newest.cleared = value.cleared;
+    newest.unsampled = value.unsampled;
     if (value.begins) newest.begins = value.begins;
   }
   encoder.finish();

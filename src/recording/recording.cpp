@@ -22,8 +22,31 @@ constexpr std::chrono::nanoseconds kAll = std::chrono::hours(24 * 365);
 
 // Whether later data may give an answer.
 bool may_come(Errc code) {
-  return code == Errc::kNotYet || code == Errc::kNotConnected || is_unknown(code);
+  return code == Errc::kNotYet || code == Errc::kNotConnected || code == Errc::kUnreachable ||
+         is_unknown(code);
 }
+
+// The owners that were not reachable while a lookup read on. If such a process returns, it has the
+// data. Another one knows nothing of the instant, whatever it says holds for all times.
+class Losses {
+ public:
+  // @return the error, if an owner was lost and another process has taken its place; or may have,
+  // and then the lookup must read on
+  [[nodiscard]] std::optional<Error> judge(const State& state, const std::optional<Lost>& lost,
+                                           Time now, bool& ends) {
+    const auto is_known = [&](const Lost& one) { return one.partition == lost->partition; };
+    if (lost && std::none_of(lost_.begin(), lost_.end(), is_known)) lost_.push_back(*lost);
+    for (const Lost& one : lost_) {
+      const Returned returned = state.returned(one, now);
+      ends = returned == Returned::kAsOther;
+      if (ends || returned == Returned::kPerhaps) return one.error;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::vector<Lost> lost_;
+};
 
 // The samples of an edge. Late ones are counted, but do not divide a gap.
 struct Gaps {
@@ -110,9 +133,15 @@ class Recording::Impl {
                                      Milliseconds wait) {
     query.at = at;
     seek(at);
+    Losses losses;
     while (true) {
       auto X_AB = lookup(a, b, query);
-      if (X_AB || !may_come(X_AB.error().code)) return X_AB;
+      bool ends = false;
+      const bool unreachable = !X_AB && X_AB.error().code == Errc::kUnreachable;
+      auto lost =
+          losses.judge(*state_, unreachable ? state_->lost(a, b) : std::nullopt, now_, ends);
+      if (lost) X_AB = tl::unexpected(*std::move(lost));
+      if (X_AB || ends || !may_come(X_AB.error().code)) return X_AB;
       const auto next = cursor_.peek();
       if (!next || std::chrono::duration_cast<Milliseconds>(*next - at) > wait || !step()) {
         return X_AB;
@@ -144,6 +173,16 @@ class Recording::Impl {
     load(now_, span_);
   }
 
+  void read_all() {
+    std::size_t left_out = 0;
+    visit(std::nullopt, Time::min(), [&](const RecordedMessage&) {
+      left_out = cursor_.left_out();
+      return true;
+    });
+    left_out_ = left_out;
+  }
+
+  [[nodiscard]] std::optional<std::size_t> left_out() const { return left_out_; }
   [[nodiscard]] const State& state() const { return *state_; }
   [[nodiscard]] const Cursor& cursor() const { return cursor_; }
   [[nodiscard]] Time instant() const { return now_; }
@@ -180,6 +219,7 @@ class Recording::Impl {
   std::chrono::nanoseconds span_ = kHistory;
   std::optional<Time> start_;
   std::optional<Time> end_;
+  std::optional<std::size_t> left_out_;  // if all was read
 };
 
 Recording::Recording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -204,10 +244,12 @@ Result<Recording> Recording::read(std::string_view bytes) {
 RecordingSummary Recording::summary() const {
   const Cursor& cursor = impl_->cursor();
   const McapReader& reader = cursor.reader();
-  return {reader.library(),       cursor.foreign(),       reader.finished(),
-          impl_->start(),         impl_->end(),           reader.size(),
-          reader.chunks().size(), reader.message_count(), cursor.problems()};
+  return {reader.library(),  cursor.foreign(), reader.finished(),      impl_->start(),
+          impl_->end(),      reader.size(),    reader.chunks().size(), reader.message_count(),
+          cursor.problems(), impl_->left_out()};
 }
+
+void Recording::read_all() { impl_->read_all(); }
 
 void Recording::seek(Time at) { impl_->seek(at); }
 Time Recording::instant() const { return impl_->instant(); }

@@ -69,6 +69,7 @@ string frame
 string parent
 int64 stamp         # nanoseconds; -1: none, the value holds for all times
                     # -2: no value, the history was cleared and the next sample follows
+                    # -3: the value is that of no instant, the first sample follows
 uint8 GIVEN = 0
 uint8 UNSPECIFIED = 1
 uint8 AS_BEFORE = 2 # as in the edge's value before this one

@@ -14,6 +14,10 @@ constexpr std::size_t kMostSamples = 2'000'000;
 constexpr std::size_t kLeastSamples = 64;
 constexpr std::size_t kMostOfOneEdge = 65'536;
 
+// The frames of another process come at once with the news that its partition is reachable. If
+// nothing comes for so long, it is the same process.
+constexpr std::chrono::seconds kSameAfter{1};
+
 EdgeTiming unlimited(std::size_t edges) {
   EdgeTiming timing;
   timing.span = std::chrono::hours(24 * 365 * 50);
@@ -41,10 +45,12 @@ State::Known& State::partition(const std::string& name) {
   return known;
 }
 
-void State::put(Known& known, const WatchedFrame& frame) {
+// @param begins  of another process, which has other values
+void State::put(Known& known, const WatchedFrame& frame, bool begins) {
   const auto before = forest_.info(frame.id);
   const std::string& owner = owners_[frame.id];
   if (owner != known.info.name) {
+    begins = true;
     if (const auto other = partitions_.find(owner); other != partitions_.end()) {
       other->second.places.clear();
       other->second.frames.erase(frame.id);
@@ -54,7 +60,7 @@ void State::put(Known& known, const WatchedFrame& frame) {
   known.frames[frame.id] = frame.parent;
   known.places.clear();
   share_memory();
-  if (before && before->parent == frame.parent) return;
+  if (before && before->parent == frame.parent && !begins) return;
   if (before) (void)forest_.release(frame.id);
   // A cycle can only be in a damaged file; the frame then waits for another parent.
   constexpr auto kAllow = Forest::MissingParent::kAllow;
@@ -96,7 +102,13 @@ void State::apply(const RecordedFrames& frames, Time log) {
   Known& known = partition(frames.partition);
   if (frames.repeats && std::exchange(known.has_state, true)) return;
   known.has_state = true;
+  const bool begins = frames.complete && frames.incarnation != known.incarnation;
   if (known.info.reachable != frames.reachable) known.info.since = log;
+  if (begins || !frames.reachable) {
+    known.returned.reset();
+  } else if (!known.info.reachable && !known.frames.empty()) {
+    known.returned = log;
+  }
   known.info.reachable = frames.reachable;
   known.why = frames.why;
   known.incarnation = frames.incarnation;
@@ -109,13 +121,14 @@ void State::apply(const RecordedFrames& frames, Time log) {
     }
   }
   for (const std::string& id : gone) drop(known, id);
-  for (const WatchedFrame& frame : frames.frames) put(known, frame);
+  for (const WatchedFrame& frame : frames.frames) put(known, frame, begins);
   frames_changed_ = frames.complete || !frames.frames.empty() || !gone.empty();
   known.info.frames = known.frames.size();
 }
 
 void State::apply(const RecordedValues& recorded, bool foreign) {
   Known& known = partition(recorded.partition);
+  if (!recorded.repeats) known.returned.reset();
   std::vector<Handle> edges;
   std::vector<PushedValue> values;
   for (const RecordedValue& one : recorded.values) {
@@ -134,6 +147,7 @@ void State::apply(const RecordedValues& recorded, bool foreign) {
                       one.value.correlation};
     value.process_noise = one.value.begins;
     value.cleared = one.value.cleared;
+    value.unsampled = one.value.unsampled;
     const bool first = valueless_.erase(one.edge.id) > 0;
     if (first && !value.process_noise) value.process_noise = Covariance();
     edges.push_back(*handle);
@@ -175,11 +189,38 @@ std::vector<PartitionNews> State::news_of(const RecordedMessage& message) {
   return news;
 }
 
+std::optional<Lost> State::lost(const std::vector<FrameInfo>& edges) const {
+  for (const FrameInfo& edge : edges) {
+    const auto found = partitions_.find(owner(edge.id));
+    if (found == partitions_.end() || found->second.info.reachable) continue;
+    const auto& [name, known] = *found;
+    const std::string why =
+        known.why.empty() ? "partition " + quote(name) + " is not reachable" : known.why;
+    return Lost{name, known.incarnation, {Errc::kUnreachable, why}};
+  }
+  return std::nullopt;
+}
+
+std::optional<Lost> State::lost(std::string_view a, std::string_view b) const {
+  const auto edges = forest_.edges(a, b);
+  return edges ? lost(*edges) : std::nullopt;
+}
+
+Returned State::returned(const Lost& lost, Time now) const {
+  const auto found = partitions_.find(lost.partition);
+  if (found == partitions_.end()) return Returned::kNo;
+  const Known& known = found->second;
+  if (known.incarnation != lost.incarnation) return Returned::kAsOther;
+  if (!known.info.reachable) return Returned::kNo;
+  return known.returned && now - *known.returned < kSameAfter ? Returned::kPerhaps : Returned::kYes;
+}
+
 // As the owners answered and the caller put it together, because to fourth order that matters.
 Result<StampedTransform> State::lookup(std::string_view a, std::string_view b,
                                        const Query& query) const {
   const auto edges = forest_.edges(a, b);
   if (!edges) return tl::unexpected(edges.error());
+  if (auto lost = this->lost(*edges)) return tl::unexpected(std::move(lost->error));
   for (const FrameInfo& edge : *edges) {
     if (valueless_.count(edge.id) == 0) continue;
     return fail(Errc::kNotYet, "frame " + quote(edge.id) + " has no value yet");
@@ -257,7 +298,8 @@ std::vector<PartitionNews> State::news() const {
     ValuesNews values;
     for (PushedValue& value : forest_.values_since(cursors, {true, {}}).values) {
       values.values.push_back({places[value.index], value.stamp, value.X,
-                               std::move(value.correlation), value.process_noise, value.cleared});
+                               std::move(value.correlation), value.process_noise, value.cleared,
+                               value.unsampled});
     }
     all.push_back({name, std::move(values)});
   }

@@ -17,6 +17,21 @@
 
 namespace tfdude::recording {
 
+/// A partition that was not reachable when a lookup needed it.
+struct Lost {
+  std::string partition;
+  std::uint64_t incarnation = 0;  ///< of its process then
+  Error error;
+};
+
+/// Whether the process of a partition that was lost has returned.
+enum class Returned {
+  kNo,
+  kPerhaps,  ///< the partition has; the next message says of which process
+  kYes,
+  kAsOther,  ///< another process serves the partition
+};
+
 /// What was known at an instant of a recording: one forest with the frames of all partitions, as a
 /// watched path has one of its edges.
 /// @par Memory  As many samples as all edges together may have.
@@ -31,9 +46,13 @@ class State {
   [[nodiscard]] std::vector<PartitionNews> news_of(const RecordedMessage& message);
 
   [[nodiscard]] const Forest& forest() const { return forest_; }
-  /// As Forest::lookup(); kNotYet also if an edge has no value yet.
+  /// As Forest::lookup(); kUnreachable if the owner of an edge was, and kNotYet also if an edge has
+  /// no value yet.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query) const;
+  /// The first owner on the path that is not reachable.
+  [[nodiscard]] std::optional<Lost> lost(std::string_view a, std::string_view b) const;
+  [[nodiscard]] Returned returned(const Lost& lost, Time now) const;
   /// The runs of edges of one owner, of a path that begins here.
   [[nodiscard]] std::vector<PathSegment> segments(const std::vector<FrameInfo>& edges,
                                                   std::string_view from) const;
@@ -52,7 +71,8 @@ class State {
     PartitionInfo info;
     std::string why;
     std::uint64_t incarnation = 0;
-    bool has_state = false;                                      // its frames have come
+    bool has_state = false;        // its frames have come
+    std::optional<Time> returned;  // since when it is reachable, perhaps as another process
     std::map<std::string, std::string> frames;                   // parents
     std::unordered_map<std::string_view, std::uint32_t> places;  // of the frames; or empty
     std::vector<JointInfo> joints;
@@ -61,7 +81,8 @@ class State {
   void apply(const RecordedFrames& frames, Time log);
   void apply(const RecordedValues& values, bool foreign);
   [[nodiscard]] static PartitionNews news_of(const RecordedValues& recorded, Known& known);
-  void put(Known& known, const WatchedFrame& frame);
+  void put(Known& known, const WatchedFrame& frame, bool begins = false);
+  [[nodiscard]] std::optional<Lost> lost(const std::vector<FrameInfo>& edges) const;
   void drop(Known& known, const std::string& id);
   void share_memory();
   [[nodiscard]] Known& partition(const std::string& name);

@@ -1,6 +1,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "recording/messages.hpp"
+#include "types/ros_rules.hpp"
 
 // Transforms as ROS has them: tf2_msgs/msg/TFMessage.
 namespace tfdude::recording {
@@ -8,6 +9,15 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kLeastTransform = 8 + 4 + 4 + 56;
+// Of the name of a frame that is left out.
+constexpr std::size_t kShown = 60;
+
+Result<void> check_edge(const WatchedFrame& edge) {
+  auto ok = check_id(edge.id, "id");
+  if (ok) ok = check_id(edge.parent, "parent");
+  if (ok && edge.id == edge.parent) return fail(Errc::kInvalidInput, "it is its own parent");
+  return ok;
+}
 
 }  // namespace
 
@@ -25,16 +35,16 @@ void TfEncoder::add(const WatchedFrame& edge, const Pose& X_PC, Time stamp) {
   for (const double number : {q.x(), q.y(), q.z(), q.w()}) writer_.f64(number);
 }
 
-Result<std::vector<RecordedValue>> decode_tf(std::string_view message) {
+Result<RecordedTransforms> decode_tf(std::string_view message) {
   CdrReader reader(message);
   const std::uint32_t count = reader.count(kLeastTransform);
-  std::vector<RecordedValue> values;
+  RecordedTransforms all;
   for (std::uint32_t i = 0; i < count && reader.good(); ++i) {
     const auto seconds = static_cast<std::int32_t>(reader.u32());
     const std::uint32_t nanos = reader.u32();
     RecordedValue recorded;
-    recorded.edge.parent = reader.text();
-    recorded.edge.id = reader.text();
+    recorded.edge.parent = ros::without_slashes(reader.text());
+    recorded.edge.id = ros::without_slashes(reader.text());
     Eigen::Vector3d p;
     for (int n = 0; n < 3; ++n) p[n] = reader.f64();
     Eigen::Quaterniond q;
@@ -43,19 +53,23 @@ Result<std::vector<RecordedValue>> decode_tf(std::string_view message) {
     q.z() = reader.f64();
     q.w() = reader.f64();
     if (!reader.good()) break;
-    const auto pose = Pose::create(q, p);
-    const bool edge = check_id(recorded.edge.id, "id") &&
-                      check_id(recorded.edge.parent, "parent") &&
-                      recorded.edge.id != recorded.edge.parent;
-    if (!pose || !edge || seconds < 0) continue;
+    const auto pose = ros::pose_of(q, p);
+    auto ok = check_edge(recorded.edge);
+    if (ok && seconds < 0) ok = fail(Errc::kInvalidInput, "its stamp is negative");
+    if (ok && !pose) ok = tl::unexpected(pose.error());
+    if (!ok) {
+      all.left_out.push_back("the transform of frame " + quote(recorded.edge.id.substr(0, kShown)) +
+                             " is left out: " + ok.error().message);
+      continue;
+    }
     recorded.value.stamp = time_of(seconds * kSecond + nanos);
     recorded.value.X_PC = {*pose, StatedCovariance::unspecified()};
-    values.push_back(std::move(recorded));
+    all.values.push_back(std::move(recorded));
   }
   if (!reader.good()) {
     return fail(Errc::kState, "a message is not a valid one of " + std::string("transforms"));
   }
-  return values;
+  return all;
 }
 
 }  // namespace tfdude::recording

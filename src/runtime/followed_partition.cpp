@@ -182,7 +182,8 @@ void FollowedPartition::admit(const Group& group, PushedValue& entry, const Mess
   bool late = false;
   if (!begins) {
     const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
-                         same(entry.X, known.X) && entry.correlation == known.correlation;
+                         entry.unsampled == known.unsampled && same(entry.X, known.X) &&
+                         entry.correlation == known.correlation;
     if (repeats) return;
     // Of one commit, a part may be missing.
     if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return;
@@ -198,8 +199,15 @@ void FollowedPartition::admit(const Group& group, PushedValue& entry, const Mess
     known.newest = entry.stamp;
     known.X = entry.X;
     known.cleared = entry.cleared;
+    known.unsampled = entry.unsampled;
   }
-  values.push_back({frame, entry.stamp, entry.X, std::move(entry.correlation), {}, entry.cleared});
+  values.push_back({frame,
+                    entry.stamp,
+                    entry.X,
+                    std::move(entry.correlation),
+                    {},
+                    entry.cleared,
+                    entry.unsampled});
   if (begins) values.back().begins = entry.process_noise;
 }
 

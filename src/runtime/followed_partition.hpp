@@ -93,6 +93,7 @@ class FollowedPartition {
     Transform X;
     Correlation correlation;
     bool cleared = false;
+    bool unsampled = false;
   };
   struct Group {
     std::uint64_t id = 0;

@@ -28,8 +28,8 @@ std::optional<Result<StampedTransform>> Gathering::take(std::vector<Reply> repli
   if (!found.ask_again) return assemble(plan_, found.answers);
   for (Part& part : plan_.parts) {
     auto& lookup = std::get<LookupRequest>(part.request.body);
-    lookup.query.at = found.ask_again;
-    lookup.hint.reset();
+    // The hint says that this is the latest common time.
+    lookup.query.at = lookup.hint = found.ask_again;
   }
   return std::nullopt;
 }

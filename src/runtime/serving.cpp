@@ -132,9 +132,11 @@ void Serving::limit_history() {
 
 Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
   for (const FrameSpec& frame : frames) {
+    const bool declared = frame.timing || options_.history.moving;
     // A frame removed by request has no edge to set.
-    if (!frame.timing || !structure_.forest.holds(frame.id)) continue;
-    if (auto set = structure_.forest.set_timing(frame.id, *frame.timing); !set) return set;
+    if (!declared || !structure_.forest.holds(frame.id)) continue;
+    const EdgeTiming& timing = frame.timing ? *frame.timing : options_.history;
+    if (auto set = structure_.forest.set_timing(frame.id, timing); !set) return set;
   }
   return {};
 }

@@ -106,6 +106,22 @@ Result<void> load_absent(const Database& database, std::int64_t format, StoredSt
   });
 }
 
+// Each stamp must belong to a stored frame.
+Result<void> load_times(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kSamplesFormat) return {};
+  const char* sql = "SELECT id, stamp FROM samples";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto time = read_time(row);
+    if (!time) return tl::unexpected(std::move(time.error()));
+    StoredFrame* frame = find_frame(state.frames, row.text(0));
+    if (frame == nullptr) {
+      return fail(Errc::kState, "a sample of " + quote(row.text(0)) + ", which does not exist");
+    }
+    frame->time = *time;
+    return {};
+  });
+}
+
 // Each correlation must belong to a stored frame or configuration entry.
 Result<void> load_correlations(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kCorrelationFormat) return {};
@@ -138,7 +154,7 @@ Result<void> load_correlations(const Database& database, std::int64_t format, St
 Result<StoredState> read_state(const Database& database, std::int64_t format) {
   StoredState state;
   for (auto part : {load_about, load_frames, load_tombstones, load_configured, load_joints,
-                    load_correlations, load_absent}) {
+                    load_correlations, load_absent, load_times}) {
     if (auto loaded = part(database, format, state); !loaded) {
       return tl::unexpected(std::move(loaded.error()));
     }

@@ -93,6 +93,17 @@ Result<StoredJoint> read_joint(const sqlite::Statement& row) {
   return joint;
 }
 
+Result<StoredTime> read_time(const sqlite::Statement& row) {
+  auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER});
+  if (ok) ok = check_id(row.text(0), "id");
+  if (!ok) return tl::unexpected(std::move(ok.error()));
+  const auto stamp = static_cast<std::int64_t>(row.number(1));
+  if (stamp == kClearedStamp) return StoredTime{std::nullopt, true};
+  if (stamp >= 0) return StoredTime{time_of(stamp), false};
+  return fail(Errc::kState,
+              "frame " + quote(row.text(0)) + ": a stamp of " + std::to_string(stamp) + " ns");
+}
+
 Result<Absent> read_absent(const sqlite::Statement& row) {
   auto ok = row.check_types({SQLITE_TEXT, SQLITE_INTEGER, SQLITE_INTEGER, SQLITE_INTEGER});
   const std::string partition = row.text(0);

@@ -20,6 +20,8 @@ namespace tfdude {
 /// Of a joint whose type is not known.
 inline constexpr std::uint64_t kNoType = 0;
 [[nodiscard]] Result<StoredJoint> read_joint(const sqlite::Statement& row);
+/// Of a frame whose value is a sample, or was cleared.
+[[nodiscard]] Result<StoredTime> read_time(const sqlite::Statement& row);
 [[nodiscard]] Result<Absent> read_absent(const sqlite::Statement& row);
 
 }  // namespace tfdude

@@ -60,6 +60,7 @@ class SqliteStore final : public StateStore {
   Result<void> save_configured(const std::vector<FrameSpec>& frames);
   Result<void> save_absent(const std::vector<Absent>& absent);
   Result<void> save_correlation(const std::string& id, const StoredCorrelation& correlation);
+  Result<void> save_time(const std::string& id, const StoredTime& time);
 
   const std::string file_;
   const StoreSync sync_;
@@ -82,6 +83,8 @@ class SqliteStore final : public StateStore {
   Statement put_configured_correlation_;
   Statement clear_absent_;
   Statement put_absent_;
+  Statement erase_sample_;
+  Statement put_sample_;
 };
 
 tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
@@ -228,6 +231,10 @@ Result<void> SqliteStore::prepare_newer() {
       {&put_configured_correlation_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
       {&clear_absent_, "DELETE FROM absent"},
       {&put_absent_, "INSERT INTO absent VALUES(?1, ?2, ?3, ?4)"},
+      {&erase_sample_, "DELETE FROM samples WHERE id = ?1"},
+      {&put_sample_,
+       "INSERT OR REPLACE INTO samples SELECT ?1, ?2 WHERE EXISTS(SELECT 1 FROM frames WHERE id = "
+       "?1)"},
   };
   Result<void> done;
   for (const auto& [statement, sql] : all) {
@@ -282,11 +289,13 @@ Result<void> SqliteStore::save_frames(const StateChange& change) {
   for (const std::string& id : change.erased) {
     if (done) done = erase_frame_.run(id);
     if (done) done = erase_correlation_.run(id);
+    if (done) done = erase_sample_.run(id);
     if (done) done = erase_tombstone_.run(id);
   }
   for (const StoredFrame& frame : change.frames) {
     if (done) done = put_frame_.run(frame.id, frame.parent, frame.X_PC, frame.lamport_time);
     if (done) done = save_correlation(frame.id, frame.correlation);
+    if (done) done = save_time(frame.id, frame.time);
   }
   for (const Tombstone& tombstone : change.tombstones) {
     const auto kind = static_cast<std::uint64_t>(tombstone.kind);
@@ -327,11 +336,18 @@ Result<void> SqliteStore::save_correlation(const std::string& id,
   return put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
 }
 
+Result<void> SqliteStore::save_time(const std::string& id, const StoredTime& time) {
+  if (!time.stamp && !time.cleared) return erase_sample_.run(id);
+  const std::int64_t stamp = time.stamp ? nanoseconds(*time.stamp) : kClearedStamp;
+  return put_sample_.run(id, static_cast<std::uint64_t>(stamp));
+}
+
 Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
   Result<void> done;
   for (const ChangedEdge& edge : edges) {
     if (done) done = set_value_.run(edge.id, edge.X_PC);
     if (done) done = save_correlation(edge.id, edge.correlation);
+    if (done) done = save_time(edge.id, edge.time);
   }
   return done;
 }

@@ -54,11 +54,19 @@ struct HistoryRestart {
 /// Combines a belief into one transform, with the basis of its covariance.
 [[nodiscard]] StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp);
 
+/// When the stored value of an edge was measured. Neither: it holds for all times, or the edge had
+/// no sample yet.
+struct StoredTime {
+  std::optional<Time> stamp{};  ///< it is a sample
+  bool cleared = false;         ///< the history was cleared, and the next sample did not come
+};
+
 /// The stored part of a held edge.
 struct ChangedEdge {
   std::string id;
   Transform X_PC;  ///< if the edge is correlated, the covariance is that of its own part
   StoredCorrelation correlation{};
+  StoredTime time{};
 };
 
 /// Commits of a forest.
@@ -73,8 +81,9 @@ struct CommitRange {
 /// A frame may name a parent that does not exist (yet). It is then a root, and is connected when
 /// the parent appears.
 ///
-/// @par Time  The value of a static edge holds for all times. An edge is dynamic from its first
-///   sample on, which is an update with a stamp. Then only its samples give its value, with
+/// @par Time  The value of a static edge holds for all times. An edge is dynamic if
+///   EdgeTiming::moving says so (see set_timing()), or from its first sample on, which is an update
+///   with a stamp. Then only its samples give its value, with
 ///   interpolate() between two of them.
 /// @par Thread safety  All functions may be called from any thread. Lookups, find, exists, info and
 ///   frames take no lock and never wait: every commit (of one edge or of many) pushes new versions
@@ -145,7 +154,9 @@ class Forest {
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
                                             std::optional<Time> stamp = std::nullopt);
 
-  /// Sets the timing of an edge, and clears its history.
+  /// Sets the timing of an edge, and clears its history, except what resume() has restored. An edge
+  /// that is declared dynamic then has no value at any instant until its first sample; lookups of
+  /// the newest value get what it has now.
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the field).
   [[nodiscard]] Result<void> set_timing(std::string_view id, const EdgeTiming& timing);
 
@@ -172,9 +183,12 @@ class Forest {
   /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming the source).
   [[nodiscard]] Result<void> correlate(std::string_view id, const Correlation& correlation);
 
-  /// Restores the correlation of a held edge that an earlier process stored.
+  /// Restores the correlation of a held edge that an earlier process stored, and when its value was
+  /// measured. A restored sample is all that is known of the edge until the next sample, which
+  /// begins another history: nobody has measured what was in between.
   /// @return as correlate().
-  [[nodiscard]] Result<void> resume(std::string_view id, const StoredCorrelation& correlation);
+  [[nodiscard]] Result<void> resume(std::string_view id, const StoredCorrelation& correlation,
+                                    const StoredTime& time = {});
 
   /// Sets edges to the values that an observation computed, as one commit: all, or on an error
   /// none. The correlation holds until the edge's next update. For a dynamic edge it is only added
@@ -226,7 +240,8 @@ class Forest {
 
   /// As lookup(), for segments of a path that another participant asks for. Their ends may be
   /// frames that do not exist, if held edges name them as their parent.
-  /// @param hint  another instant that may be useful
+  /// @param hint  another instant that may be useful; the one that was asked for says that it is
+  ///   the latest common time, which others have found
   /// @param edges  the segments are single edges, whose full correlation is needed
   [[nodiscard]] Result<SegmentValues> lookup_segments(const std::vector<PathEnds>& segments,
                                                       const Query& query = {},

@@ -55,7 +55,8 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   return {};
 }
 
-Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correlation) {
+Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correlation,
+                            const StoredTime& time) {
   auto ok = check_common_errors(correlation.said.common_errors);
   if (ok && correlation.observed) ok = check_common_errors(correlation.observed->common_errors);
   if (!ok) return fail_at("frame " + quote(id), ok.error());
@@ -70,12 +71,14 @@ Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correl
                                       correlation.observed.has_value(), 0});
   }
   impl_->set_correlation(fresh, std::move(resumed));
+  if (time.cleared || time.stamp) impl_->resume_history(fresh, time);
   impl_->commit();
   return {};
 }
 
 ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
-  ChangedEdge kept{edge.name->text, edge.X_PC, {}};
+  ChangedEdge kept{edge.name->text, edge.X_PC, {}, {std::nullopt, edge.stamp == kNoSample}};
+  if (edge.moving() && !edge.lacks_sample()) kept.time.stamp = tfdude::time_of(edge.stamp);
   if (edge.correlation == nullptr) return kept;
   kept.correlation.said = edge.correlation->said;
   if (edge.correlation->revised) kept.correlation.observed = edge.correlation->now;
@@ -95,7 +98,7 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
   if (!is_finite(revision.X_PC)) return check_value(revision.id, revision.X_PC);
   if (auto ok = check_common_errors(revision.correlation.common_errors); !ok)
     return fail_at(who, ok.error());
-  if (!edge.moving()) {
+  if (!edge.moving() || (edge.unsampled() && !stamp)) {
     if (edge.commit <= seen) return {};
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
   }
@@ -149,7 +152,7 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
-    if (newest.moving()) {
+    if (newest.moving() && stamp) {
       const Transform X_PC = Impl::whole(edges[i].X_PC, edges[i].correlation);
       impl_->replace_sample(newest, X_PC, nanoseconds(*stamp));
       continue;

@@ -41,11 +41,16 @@ Forest::Impl::~Impl() {
 void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& value,
                                    std::int64_t stamp) {
   const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
+  begin_history(newest, value, stamp);
+  newest.name->refused.end_row();
+  if (restart_listener_) restart_listener_(restart);
+}
+
+void Forest::Impl::begin_history(const HeldVersion& newest, const GivenValue& value,
+                                 std::int64_t stamp) {
   HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   forget_history(fresh);
   append_to(fresh, value, stamp);
-  newest.name->refused.end_row();
-  if (restart_listener_) restart_listener_(restart);
 }
 
 Sample Forest::Impl::sample_at(const SampleHistory& samples, std::uint64_t place,
@@ -103,10 +108,21 @@ void Forest::Impl::clear_history(const HeldVersion& edge) {
   edge.name->refused.end_row();
   HeldVersion& fresh = push_held(edge.slot, edge.X_PC);
   forget_history(fresh);
-  if (fresh.samples == nullptr) fresh.samples = new SampleHistory(default_timing_);
-  fresh.stamp = kNoSample;
-  fresh.number = 0;
+  await_sample(fresh, kNoSample);
   end_revision(fresh);
+}
+
+void Forest::Impl::await_sample(HeldVersion& fresh, std::int64_t stamp) {
+  if (fresh.samples == nullptr) fresh.samples = new SampleHistory(default_timing_);
+  fresh.stamp = stamp;
+  fresh.number = 0;
+}
+
+void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left) {
+  await_sample(fresh, left.cleared ? kNoSample : kUnsampled);
+  if (left.cleared || !left.stamp) return;
+  append_to(fresh, {fresh.X_PC}, nanoseconds(*left.stamp));
+  fresh.samples->left_behind = true;
 }
 
 Result<void> Forest::clear_history(std::string_view id) {
@@ -114,7 +130,7 @@ Result<void> Forest::clear_history(std::string_view id) {
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const HeldVersion& edge = impl_->frames_.newest_value(*slot);
-  if (!edge.moving()) return {};
+  if (!edge.moving() || edge.unsampled()) return {};
   impl_->clear_history(edge);
   impl_->commit();
   return {};
@@ -140,10 +156,18 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
-  HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
+  const HeldVersion& newest = impl_->frames_.newest_value(*slot);
+  const StoredTime left = Impl::kept(newest).time;
+  const bool resumes = newest.left_behind() || left.cleared;
+  HeldVersion& fresh = impl_->push_held(*slot, newest.X_PC);
   impl_->forget_history(fresh);
   delete fresh.samples;  // no reader has seen it
   fresh.samples = new SampleHistory(timing);
+  if (resumes) {
+    impl_->resume_history(fresh, left);
+  } else if (timing.moving) {
+    impl_->await_sample(fresh);
+  }
   impl_->commit();
   return {};
 }

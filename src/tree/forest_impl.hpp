@@ -99,6 +99,10 @@ class Forest::Impl {
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Pushes a version of a dynamic edge without any sample.
   void clear_history(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
+  /// Makes the fresh version, which has no sample, dynamic.
+  void await_sample(HeldVersion& fresh, std::int64_t stamp = kUnsampled) TFDUDE_REQUIRES(mutex_);
+  /// Makes the value of the fresh version, which has no sample, what an earlier process has left.
+  void resume_history(HeldVersion& fresh, const StoredTime& left) TFDUDE_REQUIRES(mutex_);
   /// Retires a history with all its samples.
   void give_back(SampleHistory* samples) TFDUDE_REQUIRES(mutex_);
   /// A sample of the current commit for a place in a history; it shares with a neighbour there what
@@ -177,6 +181,8 @@ class Forest::Impl {
   void append_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void restart_history(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void begin_history(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void insert_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);

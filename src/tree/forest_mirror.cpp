@@ -41,6 +41,13 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
     clear_history(newest);
     return true;
   }
+  if (value.unsampled) {
+    const HeldVersion& newest = frames_.newest_value(slot);
+    // Within one history, an edge that had a sample has had one.
+    if (!value.process_noise && (!newest.unsampled() || same(newest.X_PC, value.X))) return false;
+    await_sample(push_held(slot, value.X));
+    return true;
+  }
   if (value.stamp) {
     const bool taken =
         push_told_sample(frames_.newest_value(slot), value.X, nanoseconds(*value.stamp), replace);

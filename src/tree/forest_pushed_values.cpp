@@ -94,7 +94,7 @@ class Telling {
   /// The samples from `first` on whose commits are after `seen`; 0: nothing was seen.
   void tell_samples(std::uint64_t first, std::uint64_t seen);
   void tell_newest(std::uint64_t seen);
-  void tell_cleared(std::uint64_t seen);
+  void tell_no_sample(std::uint64_t seen);
 
   void finish(bool begins);
 
@@ -144,10 +144,11 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
   if (samples.sample(edge_.number) == nullptr) tell(time_of(edge_.stamp), edge_.X_PC);
 }
 
-void Telling::tell_cleared(std::uint64_t seen) {
+void Telling::tell_no_sample(std::uint64_t seen) {
   if (edge_.commit <= seen) return;
   tell(std::nullopt, edge_.X_PC);
-  values_.back().cleared = true;
+  values_.back().unsampled = edge_.unsampled();
+  values_.back().cleared = !edge_.unsampled();
 }
 
 void Telling::finish(bool begins) {
@@ -166,7 +167,7 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
   const std::uint64_t seen = begins ? 0 : cursor.commit;
   Telling telling(edge, index, values);
   if (edge.lacks_sample()) {
-    telling.tell_cleared(seen);
+    telling.tell_no_sample(seen);
   } else if (edge.moving() && query.newest_only) {
     telling.tell_newest(seen);
   } else if (edge.moving()) {

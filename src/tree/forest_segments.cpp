@@ -32,13 +32,14 @@ struct Reached {
   [[nodiscard]] Output output() { return {X, correlation}; }
 };
 
-Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments, std::int64_t t,
-                                       const Query& query, PathLookup::Met& met) {
+Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments,
+                                       const PathLookup::Instant& at, const Query& query,
+                                       PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   for (const Ends& ends : segments) {
     PathLookup::Met of_this;
-    auto ok = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, t, query, of_this,
+    auto ok = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, at, query, of_this,
                                    values.emplace_back().output());
     if (!ok) return tl::unexpected(std::move(ok.error()));
     met.moving = met.moving || of_this.moving;
@@ -67,7 +68,7 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   if (!mixed) return values;
   Query query;
   query.order = order;
-  return values_at(segments, met.limiting->stamp, query, met);
+  return values_at(segments, {met.limiting->stamp, true}, query, met);
 }
 
 template <class Visit>
@@ -197,13 +198,13 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   }
 }
 
-Result<SegmentValues> segments_at(const std::vector<Ends>& segments, std::int64_t t,
+Result<SegmentValues> segments_at(const std::vector<Ends>& segments, const PathLookup::Instant& at,
                                   const Query& query) {
   PathLookup::Met met;
-  auto values = values_at(segments, t, query, met);
+  auto values = values_at(segments, at, query, met);
   if (!values) return tl::unexpected(std::move(values.error()));
-  SegmentValues found = values_of(segments, *std::move(values), t);
-  if (met.moving) found.stamp = time_of(t);
+  SegmentValues found = values_of(segments, *std::move(values), at.t);
+  if (met.moving) found.stamp = time_of(at.t);
   return found;
 }
 
@@ -222,9 +223,16 @@ Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Q
   return found;
 }
 
-// The newest values, or that an edge has lost its samples.
+// The newest values, or that an edge has lost its samples. If one had none yet, they are those of
+// no instant.
 Result<SegmentValues> newest_or_cleared(const std::vector<Ends>& segments) {
   auto newest = newest_segments(segments, {});
+  if (newest) {
+    for_each_held(segments, [&](const HeldVersion& edge) {
+      newest->unsampled = newest->unsampled || edge.unsampled();
+    });
+    if (newest->unsampled) newest->stamp.reset();
+  }
   if (newest || newest.error().code != Errc::kNotYet) return newest;
   SegmentValues none;
   none.values.resize(segments.size());
@@ -240,18 +248,20 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
-  Result<SegmentValues> found =
-      query.at ? segments_at(*ends, nanoseconds(*query.at), query) : newest_segments(*ends, query);
+  const bool common = hint == query.at;
+  Result<SegmentValues> found = query.at
+                                    ? segments_at(*ends, {nanoseconds(*query.at), common}, query)
+                                    : newest_segments(*ends, query);
   if (found && !query.at && found->stamp && query.age_noise_until) {
     const std::chrono::nanoseconds period = found->period;
-    found = segments_at(*ends, nanoseconds(*found->stamp), query);
+    found = segments_at(*ends, {nanoseconds(*found->stamp), true}, query);
     if (found) found->period = period;
   }
   if (!found) return found;
   describe(*ends, *found);
   if (edges) tell_observed_with(*ends, *found);
   if (hint && found->stamp && hint != found->stamp) {
-    auto at_hint = segments_at(*ends, nanoseconds(*hint), query);
+    auto at_hint = segments_at(*ends, {nanoseconds(*hint), true}, query);
     if (at_hint) {
       found->at_hint = std::move(at_hint->values);
       found->correlations_at_hint = std::move(at_hint->correlations);
@@ -277,7 +287,7 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
         std::lower_bound(instants.begin(), instants.end(), nanoseconds(*newest->stamp));
     const auto count = std::min(static_cast<std::size_t>(end - instants.begin()), most);
     for (auto t = end - static_cast<std::ptrdiff_t>(count); t != end; ++t) {
-      auto then = segments_at(*ends, *t, {});
+      auto then = segments_at(*ends, {*t}, {});
       if (!then) continue;  // another edge has begun later
       then->commit = newest->commit;
       then->history = newest->history;

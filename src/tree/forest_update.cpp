@@ -55,7 +55,8 @@ Result<std::int64_t> Forest::Impl::stamp_for(const HeldVersion* const* edges, st
   for (std::size_t i = 0; i < count; ++i) {
     const HeldVersion& edge = *edges[i];
     moving = moving || edge.moving() || timing_of(edge).moving;
-    newest = std::max(newest, edge.stamp);
+    // A clock may have restarted with the process.
+    if (!edge.left_behind()) newest = std::max(newest, edge.stamp);
   }
   if (!moving) return kAlways;
   if (!clock_.is_there()) {
@@ -90,6 +91,8 @@ void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::
     end_revision(push_held(slot, value.X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
     append_sample(old, value, stamp);
+  } else if (old.left_behind()) {
+    begin_history(old, value, stamp);
   } else if (stamp < old.stamp - old.samples->timing().span.count()) {
     restart_history(old, value, stamp);
   } else {
@@ -102,6 +105,8 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
   SampleHistory* samples = newest.samples;
   if (samples == nullptr) {
     samples = new SampleHistory(default_timing_);
+  } else if (samples->left_behind) {
+    return begin_history(newest, value, stamp);
   } else {
     // First, so that the ring buffer need not grow for it. At least two samples are kept, so this
     // is not the newest.

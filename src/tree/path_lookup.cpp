@@ -64,8 +64,8 @@ tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
 }
 
 tl::unexpected<Error> no_sample(const HeldVersion& edge) {
-  return fail(Errc::kNotYet, "the edge of " + quote(edge.name->text) +
-                                 " has had no sample since its history was cleared");
+  return fail(Errc::kNotYet, "the edge of " + quote(edge.name->text) + " has had no sample " +
+                                 (edge.unsampled() ? "yet" : "since its history was cleared"));
 }
 
 tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std::string& more) {
@@ -102,6 +102,7 @@ struct Moment {
   std::int64_t t;
   std::int64_t age;  // adds the process noise until then
   const Query& query;
+  bool common;             // as of PathLookup::Instant
   std::uint64_t back = 0;  // see SampleHistory::around()
 };
 
@@ -140,6 +141,10 @@ template <class Value>
 Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edge, Moment& moment) {
   const std::int64_t t = moment.t;
   if (t > edge.stamp) {
+    if (moment.common && edge.unsampled()) {
+      path.up(value_of<Value>(edge));
+      return {};
+    }
     OfEdge<Value>& X = path.place();
     auto computed = compute_beyond<Value>(edge, t, moment.query, X);
     if (!computed) return computed;
@@ -232,7 +237,7 @@ Result<void> PathLookup::walk_newest(const Ends& ends, Absent absent, Order orde
   bool mixed = false;
   bool correlated = false;
   const auto take = [&](auto& path, const HeldVersion& edge) {
-    if (edge.moving()) {
+    if (edge.limits()) {
       if (limiting == nullptr) limiting = &edge;
       if (edge.stamp != limiting->stamp) {
         mixed = true;
@@ -250,18 +255,18 @@ Result<void> PathLookup::walk_newest(const Ends& ends, Absent absent, Order orde
   if (!newest || !mixed || correlated) return newest;
   Query query;
   query.order = order;
-  return walk_at(ends, absent, met.limiting->stamp, query, met, X_AB);
+  return walk_at(ends, absent, {met.limiting->stamp, true}, query, met, X_AB);
 }
 
 template <class Value>
-Result<void> PathLookup::walk_at(const Ends& ends, Absent absent, std::int64_t t,
+Result<void> PathLookup::walk_at(const Ends& ends, Absent absent, const Instant& at,
                                  const Query& query, Met& met, Value& X_AB) {
-  const std::int64_t age =
-      query.age_noise_until
-          ? std::max(saturating_subtract(nanoseconds(*query.age_noise_until), t), std::int64_t{0})
-          : 0;
+  std::int64_t age = 0;
+  if (query.age_noise_until) {
+    age = std::max(saturating_subtract(nanoseconds(*query.age_noise_until), at.t), age);
+  }
   // An edge without samples is behind every instant.
-  Moment moment{std::max(t, kNoSample + 1), age, query};
+  Moment moment{std::max(at.t, kNoSample + 1), age, query, at.common};
   const auto take = [&](auto& path, const HeldVersion& edge) -> Result<void> {
     if (leaves_out_correlation<Value>(edge)) met.correlated = true;
     if (edge.moving()) {
@@ -297,15 +302,15 @@ Result<void> PathLookup::reach_newest(const Ends& ends, Absent absent, Order ord
   return walked ? pass(std::move(whole), X_AB) : walked;
 }
 
-Result<void> PathLookup::reach_at(const Ends& ends, Absent absent, std::int64_t t,
+Result<void> PathLookup::reach_at(const Ends& ends, Absent absent, const Instant& at,
                                   const Query& query, Met& met, Output X_AB) {
   if (query.order == Order::kSecond) {
-    auto plain = walk_at(ends, absent, t, query, met, X_AB.X);
+    auto plain = walk_at(ends, absent, at, query, met, X_AB.X);
     if (!plain || !met.correlated) return plain;
   }
   met = {};
   Belief whole;
-  auto walked = walk_at(ends, absent, t, query, met, whole);
+  auto walked = walk_at(ends, absent, at, query, met, whole);
   return walked ? pass(std::move(whole), X_AB) : walked;
 }
 
@@ -343,7 +348,8 @@ Result<void> PathLookup::compute(Name a, Name b, const Query& query, StampedTran
   }
   if (query.at || (at && query.age_noise_until)) {
     met = {};
-    auto then = reach_at(*found, Absent::kEnds, nanoseconds(*at), query, met, output);
+    const Instant instant{nanoseconds(*at), !query.at};
+    auto then = reach_at(*found, Absent::kEnds, instant, query, met, output);
     if (!then) return then;
   }
   if (!met.moving) at.reset();

@@ -31,12 +31,19 @@ class PathLookup {
     bool correlated = false;
   };
 
+  /// An instant of a lookup.
+  struct Instant {
+    std::int64_t t;
+    /// It is the latest common time, so edges that had no sample yet have their first value.
+    bool common = false;
+  };
+
   /// X_AB at the newest instant common to all dynamic edges: that of the newest sample of
   /// Met::limiting.
   [[nodiscard]] static Result<void> reach_newest(const Ends& ends, Absent absent, Order order,
                                                  Met& met, Output X_AB);
-  /// X_AB at t.
-  [[nodiscard]] static Result<void> reach_at(const Ends& ends, Absent absent, std::int64_t t,
+  /// X_AB at an instant.
+  [[nodiscard]] static Result<void> reach_at(const Ends& ends, Absent absent, const Instant& at,
                                              const Query& query, Met& met, Output X_AB);
 
   /// Value is Transform, or Pose if no covariance is needed; Name is an id or a handle. Takes its
@@ -75,7 +82,7 @@ class PathLookup {
   [[nodiscard]] static Result<void> walk_newest(const Ends& ends, Absent absent, Order order,
                                                 Met& met, Value& X_AB);
   template <class Value>
-  [[nodiscard]] static Result<void> walk_at(const Ends& ends, Absent absent, std::int64_t t,
+  [[nodiscard]] static Result<void> walk_at(const Ends& ends, Absent absent, const Instant& at,
                                             const Query& query, Met& met, Value& X_AB);
 
   const Frames& frames_;

@@ -39,6 +39,8 @@ struct PushedValue {
   bool covariance_known = false;
   /// The history was cleared: the edge is dynamic, and has no value until its next sample.
   bool cleared = false;
+  /// The edge is dynamic, and had no sample yet: the value is that of no instant.
+  bool unsampled = false;
 };
 
 /// Whether two values are the same, so that one need not be told after the other.

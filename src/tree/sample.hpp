@@ -15,9 +15,13 @@ namespace tfdude {
 /// The stamp of a value that holds for all times.
 inline constexpr std::int64_t kAlways = INT64_MIN;
 
-/// The stamp of a dynamic edge whose history was cleared, until its next sample; earlier than all
-/// others.
-inline constexpr std::int64_t kNoSample = kAlways + 1;
+/// The stamp of an edge that is declared dynamic, until its first sample: it has no value at any
+/// instant. Only lookups of the newest value get what it was configured with.
+inline constexpr std::int64_t kUnsampled = kAlways + 1;
+
+/// The stamp of a dynamic edge whose history was cleared, until its next sample; earlier than those
+/// of all samples.
+inline constexpr std::int64_t kNoSample = kAlways + 2;
 
 /// What consecutive samples share: their covariance, or the joint whose positions they are.
 struct SharedPart {

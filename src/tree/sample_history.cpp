@@ -108,6 +108,7 @@ std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
   std::unique_ptr<SampleHistory> copy(new SampleHistory(timing_, capacity));
   const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
+  copy->left_behind = left_behind;
   copy->first_.store(first, std::memory_order_relaxed);
   copy->next_ = std::max(first, end);
   for (std::uint64_t number = first; number < end; number += kSize - number % kSize) {

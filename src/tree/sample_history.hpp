@@ -136,6 +136,10 @@ class SampleHistory {
   /// The commit of the last sample that was inserted or replaced. Set before readers see it.
   std::uint64_t rewritten = 0;
 
+  /// Its only sample is the last one of an earlier process. What was between that and the next
+  /// sample nobody has measured, so the next one begins another history. Set before readers see it.
+  bool left_behind = false;
+
   std::uint64_t retire_tag = 0;
 
  private:

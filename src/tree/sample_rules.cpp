@@ -37,6 +37,7 @@ bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
 }  // namespace
 
 Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
+  if (newest.left_behind()) return {};  // it begins another history
   const SampleHistory& samples = *newest.samples;
   const std::uint64_t place = samples.place_of(stamp);
   if (place < samples.next() && samples.stamp(place) == stamp) {

@@ -58,6 +58,8 @@ struct SegmentValues {
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
   /// There are no values: the history of an edge was cleared. Only of segments_since().
   bool cleared = false;
+  /// They are those of no instant: an edge had no sample yet. Only of segments_since().
+  bool unsampled = false;
 };
 
 /// What was seen of segments: their values at a commit, at instants up to their newest one. Late

@@ -12,7 +12,7 @@ bool is_unspecified(const HeldVersion& edge) { return !edge.X_PC.covariance.comp
 // Whether a sample that the value at that instant is computed from is unspecified. One that was
 // dropped meanwhile may have been.
 bool is_unspecified_at(const HeldVersion& edge, std::int64_t t) {
-  if (!edge.moving() || t == edge.stamp) return is_unspecified(edge);
+  if (!edge.moving() || edge.unsampled() || t == edge.stamp) return is_unspecified(edge);
   if (t > edge.stamp) {
     return is_unspecified(edge) || is_unspecified(edge.samples->sample(edge.number - 1));
   }

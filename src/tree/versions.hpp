@@ -61,8 +61,14 @@ struct alignas(64) HeldVersion : Version {
   std::uint64_t history = 0;
 
   [[nodiscard]] bool moving() const { return stamp != kAlways; }
-  /// Whether it has no value, as its history was cleared.
-  [[nodiscard]] bool lacks_sample() const { return stamp == kNoSample; }
+  /// Whether it has no value at any instant: it had no sample yet, or its history was cleared.
+  [[nodiscard]] bool lacks_sample() const { return stamp == kNoSample || unsampled(); }
+  /// Whether it is dynamic, and had no sample yet.
+  [[nodiscard]] bool unsampled() const { return stamp == kUnsampled; }
+  /// Whether its stamp limits the latest common time.
+  [[nodiscard]] bool limits() const { return stamp > kUnsampled; }
+  /// Whether its only sample is the last one of an earlier process.
+  [[nodiscard]] bool left_behind() const { return samples != nullptr && samples->left_behind; }
 };
 
 /// The newest version of each slot. Grows without moving memory that readers access: segment k

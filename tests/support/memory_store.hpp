@@ -37,6 +37,7 @@ class MemoryStore final : public StateStore {
       if (there == frames_.end()) continue;
       there->second.X_PC = edge.X_PC;
       there->second.correlation = edge.correlation;
+      there->second.time = edge.time;
     }
     return {};
   }

@@ -1,7 +1,6 @@
 #include "names.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "tfdude/base/id.hpp"
 
@@ -38,11 +37,6 @@ bool Patterns::match(std::string_view name) const {
                      [name](const std::string& pattern) { return matches(pattern, name); });
 }
 
-std::string_view without_slashes(std::string_view name) {
-  const std::size_t begin = name.find_first_not_of('/');
-  return begin == std::string_view::npos ? std::string_view() : name.substr(begin);
-}
-
 Result<std::string> id_of(std::string_view ros_name, const std::string& prefix) {
   const std::string_view name = without_slashes(ros_name);
   std::string id = name.empty() ? std::string() : prefix + std::string(name);
@@ -59,15 +53,9 @@ std::optional<std::string> ros_name_of(std::string_view id, std::string_view pre
 }
 
 Result<Pose> pose_of(const RosPose& pose) {
-  constexpr double kTolerance = 1e-2;
   const auto& [x, y, z, w] = pose.quat;
-  Eigen::Quaterniond q(w, x, y, z);
-  // Also rejects NaN.
-  if (!(std::abs(q.squaredNorm() - 1) < kTolerance)) {
-    return fail(Errc::kInvalidInput, "rotation: the quaternion is not of unit length");
-  }
-  q.normalize();
-  return Pose::create(q, Eigen::Vector3d(pose.xyz[0], pose.xyz[1], pose.xyz[2]));
+  return pose_of(Eigen::Quaterniond(w, x, y, z),
+                 Eigen::Vector3d(pose.xyz[0], pose.xyz[1], pose.xyz[2]));
 }
 
 RosPose ros_pose_of(const Pose& pose) {

@@ -9,6 +9,7 @@
 #include "tfdude/math/pose.hpp"
 
 #include "../messages.hpp"
+#include "types/ros_rules.hpp"
 
 // What ROS's names and numbers are here.
 namespace tfdude::ros {
@@ -36,9 +37,6 @@ struct Choice {
   }
 };
 
-/// ROS 1 had a leading slash, and some nodes still do.
-[[nodiscard]] std::string_view without_slashes(std::string_view name);
-
 /// The id of a frame of ROS: without leading slashes, with the prefix.
 /// @return kInvalidInput naming the frame: as check_new_id().
 [[nodiscard]] Result<std::string> id_of(std::string_view ros_name, const std::string& prefix);
@@ -46,8 +44,7 @@ struct Choice {
 /// The inverse. @return none for a frame without the prefix: it has no name in ROS
 [[nodiscard]] std::optional<std::string> ros_name_of(std::string_view id, std::string_view prefix);
 
-/// Quaternions are normalized if their squared norm is within 0.01 of one, as in tf2.
-/// @return kInvalidInput naming the field.
+/// By the rules of recordings of ROS. @return kInvalidInput naming the field.
 [[nodiscard]] Result<Pose> pose_of(const RosPose& pose);
 [[nodiscard]] RosPose ros_pose_of(const Pose& pose);
 

@@ -33,6 +33,8 @@ struct RecordingSummary {
   std::optional<std::uint64_t> messages;  ///< absent: not known without reading the file
   /// What is wrong with the file, as far as it was read; sentences for people.
   std::vector<std::string> problems;
+  /// Invalid transforms of ROS that were left out; absent: the whole file was not read for it.
+  std::optional<std::size_t> left_out{};
 };
 
 /// A recorded change of frames or values, and when it was recorded.
@@ -67,6 +69,8 @@ class TFDUDE_EXPORT Recording {
   ~Recording();
 
   [[nodiscard]] RecordingSummary summary() const;
+  /// Reads the whole file, so that summary() knows all that is wrong with it, and left out.
+  void read_all();
 
   /// Goes to an instant. From the next earlier place where all values are written once more, the
   /// file is read up to there: mostly 8 to 16 MB.

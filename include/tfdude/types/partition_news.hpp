@@ -33,7 +33,7 @@ struct FramesNews {
 /// A value X_PC of an edge.
 struct WatchedValue {
   std::uint32_t frame = 0;    ///< index among the last reported frames
-  std::optional<Time> stamp;  ///< absent: it holds for all times
+  std::optional<Time> stamp;  ///< absent: it holds for all times, if nothing else is said below
   Transform X_PC;
   /// Of the edge, from now on and for all its history.
   Correlation correlation{};
@@ -42,6 +42,8 @@ struct WatchedValue {
   std::optional<Covariance> begins{};
   /// The history was cleared: the edge is dynamic, and has no value until its next sample.
   bool cleared = false;
+  /// The edge is dynamic, and had no sample yet. The value, as configured, is that of no instant.
+  bool unsampled = false;
 };
 
 /// What the owner has written in one commit, or in several consecutive ones. Samples of an edge are

@@ -204,7 +204,10 @@ Result<PushedValues> from_wire(const wire::State& sample) {
     }
     auto noise = read_process_noise(one.process_noise());
     if (!noise) return fail_at("pushed values", noise.error());
-    pushed.entries[one.entry()].process_noise = *noise;
+    PushedValue& entry = pushed.entries[one.entry()];
+    // Listed twice: it had no sample yet.
+    entry.unsampled = entry.process_noise && !entry.stamp && !entry.cleared;
+    entry.process_noise = *noise;
   }
   return pushed;
 }

@@ -357,6 +357,18 @@ wire::State to_wire(const PushedValues& pushed) {
   return sample;
 }
 
+namespace {
+
+void write_beginning(std::uint32_t entry, const Covariance& noise, wire::State& sample) {
+  sample.beginnings().emplace_back();
+  sample.beginnings().back().entry(entry);
+  const Covariance::Upper& upper = noise.upper();
+  if (upper == Covariance::Upper{}) return;
+  sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
+}
+
+}  // namespace
+
 void write_wire(const PushedValues& pushed, wire::State& sample) {
   sample.beginnings().clear();
   sample.correlations().clear();
@@ -366,10 +378,14 @@ void write_wire(const PushedValues& pushed, wire::State& sample) {
   sample.piece(pushed.piece);
   sample.pieces(pushed.pieces);
   sample.entries().resize(pushed.entries.size());
+  // Says that an entry had no sample yet. If there is no room for it, it has no value.
+  const std::size_t most_twice = kMaxItems - std::min(kMaxItems, pushed.entries.size());
+  std::size_t listed_twice = 0;
   for (std::size_t i = 0; i < pushed.entries.size(); ++i) {
     sample.entries()[i].index(pushed.entries[i].index);
-    sample.entries()[i].stamp(pushed.entries[i].cleared ? kClearedStamp
-                                                        : wire_stamp(pushed.entries[i].stamp));
+    const bool twice = pushed.entries[i].unsampled && listed_twice < most_twice;
+    const bool no_value = pushed.entries[i].cleared || (pushed.entries[i].unsampled && !twice);
+    sample.entries()[i].stamp(no_value ? kClearedStamp : wire_stamp(pushed.entries[i].stamp));
     sample.entries()[i].history(pushed.entries[i].history);
     sample.entries()[i].covariance(pushed.entries[i].covariance_number);
     if (pushed.entries[i].covariance_known) {
@@ -377,14 +393,12 @@ void write_wire(const PushedValues& pushed, wire::State& sample) {
     } else {
       write_transform(pushed.entries[i].X, sample.entries()[i].x());
     }
-    if (const auto& noise = pushed.entries[i].process_noise) {
-      sample.beginnings().emplace_back();
-      sample.beginnings().back().entry(static_cast<std::uint32_t>(i));
-      const Covariance::Upper& upper = noise->upper();
-      if (upper != Covariance::Upper{}) {
-        sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
-      }
+    if (twice || pushed.entries[i].process_noise) {
+      const Covariance noise = pushed.entries[i].process_noise.value_or(Covariance());
+      write_beginning(static_cast<std::uint32_t>(i), noise, sample);
+      if (twice) write_beginning(static_cast<std::uint32_t>(i), noise, sample);
     }
+    listed_twice += twice ? 1 : 0;
     const Correlation& correlation = pushed.entries[i].correlation;
     if (correlation.empty()) continue;
     sample.correlations().emplace_back();

@@ -49,6 +49,30 @@ TEST_CASE("a pushed value without covariance has the one before or none") {
   CHECK(arrived->entries[1].covariance_known);
 }
 
+TEST_CASE("a pushed value of an edge that had no sample yet says so") {
+  PushedValue begins{0, {}, Transform(), {}, 1};
+  begins.process_noise = Covariance();
+  begins.unsampled = true;
+  PushedValue goes_on = begins;
+  goes_on.process_noise.reset();
+  PushedValue fixed = begins;
+  fixed.unsampled = false;
+  const auto arrived =
+      from_wire(travelled<StateType>(to_wire(PushedValues{1, {begins, goes_on, fixed}})));
+  REQUIRE(arrived);
+  CHECK(arrived->entries[0].unsampled);
+  CHECK(arrived->entries[0].process_noise);
+  CHECK(arrived->entries[1].unsampled);
+  CHECK_FALSE(arrived->entries[2].unsampled);
+  CHECK(arrived->entries[2].process_noise);
+  // If there are too many to say it of all, some have no value.
+  PushedValues many{1, std::vector<PushedValue>(kMaxItems - 1, begins)};
+  const auto all = from_wire(travelled<StateType>(to_wire(many)));
+  REQUIRE(all);
+  CHECK(all->entries[0].unsampled);
+  CHECK(all->entries[1].cleared);
+}
+
 TEST_CASE("a reply whose unspecified edges belong to no value is rejected") {
   SegmentValues found;
   found.values = {{Pose(), StatedCovariance::unspecified()}};
