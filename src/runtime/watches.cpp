@@ -96,17 +96,24 @@ bool Watches::follow(const Path& path, WatchRoute& route, bool renew) {
   } else if (!renew && path->up_to_date()) {
     return true;
   }
+  bool all_open = true;
   for (const WatchRoute::Source& source : route.sources) {
-    if (!open_.contains(source.group) && links_.open(source.partition, source.group)) {
+    if (open_.contains(source.group)) continue;
+    auto opened = links_.open(source.partition, source.group);
+    if (opened) {
       open_.insert(source.group, Clock::now());
+      continue;
     }
+    // Without it values come only with the answers.
+    path->set_health(std::move(opened));
+    all_open = false;
   }
   if (!ask(path, route, path->lacks_history())) return false;
   // Only the first answers show that one edge is ahead of the data of another.
   if (const auto from = path->lacks_history()) {
     if (!ask(path, route, from)) return false;
   }
-  return path->up_to_date();
+  return all_open && path->up_to_date();
 }
 
 bool Watches::cannot_be_planned(const Path& path, Error why) {

@@ -25,13 +25,14 @@ Result<void> ClockChannel::publish(Time now) {
   std::shared_ptr<Writer> writer;
   {
     const Lock lock(mutex_);
-    if (writer_ == nullptr) {
+    if (writer_ == nullptr || !writer_->good()) {
       writer_ = std::make_shared<Writer>(context_, topic_, "", "call_writer");
     }
     writer = writer_;
   }
   wire::Clock sample = to_wire(now);
-  if (writer->good() && writer->write(&sample)) return {};
+  if (!writer->good()) return writer->check();
+  if (writer->write(&sample)) return {};
   return fail(Errc::kTransport, "the time could not be published");
 }
 

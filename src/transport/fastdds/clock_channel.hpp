@@ -18,7 +18,10 @@ class ClockChannel {
   /// @param on_clock  called with each time; null: it is not received
   ClockChannel(const Context& context, edds::Topic& topic, std::function<void(Time)> on_clock);
 
-  [[nodiscard]] bool good() const { return reader_ == nullptr || reader_->good(); }
+  /// @return kTransport, with what could not be created
+  [[nodiscard]] Result<void> check() const {
+    return reader_ != nullptr ? reader_->check() : Result<void>();
+  }
 
   /// Creates the writer at the first use. @return kTransport
   [[nodiscard]] Result<void> publish(Time now);

@@ -14,6 +14,7 @@ EndpointNumbers::Id EndpointNumbers::created(std::function<void()> announce) {
 }
 
 void EndpointNumbers::deleted(Id endpoint) {
+  if (endpoint == kNone) return;
   Lock lock(mutex_);
   announced_.wait(lock, [&]() TFDUDE_REQUIRES(mutex_) { return announcing_ != endpoint; });
   const auto known = numbers_.find(endpoint);
@@ -36,7 +37,7 @@ void EndpointNumbers::tidy() {
     lock.unlock();
     announce();
     lock.lock();
-    announcing_ = 0;
+    announcing_ = kNone;
     announced_.notify_all();
   }
 }

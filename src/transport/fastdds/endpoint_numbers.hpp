@@ -20,14 +20,17 @@ class EndpointNumbers {
  public:
   using Id = std::uint64_t;
 
+  /// Of no endpoint.
+  static constexpr Id kNone = 0;
+
   static constexpr std::uint64_t kMostUnused = 128;
 
   /// An endpoint was created, and thereby announced.
   /// @param announce  announces it again
   [[nodiscard]] Id created(std::function<void()> announce);
 
-  /// An endpoint is going to be deleted, which is announced, too. Waits while it is being announced
-  /// again: do not call this with a lock that a callback of Fast DDS takes.
+  /// An endpoint is going to be deleted, which is announced, too; nothing for kNone. Waits while it
+  /// is being announced again: do not call this with a lock that a callback of Fast DDS takes.
   void deleted(Id endpoint);
 
   /// Announces the oldest endpoints again, until at most kMostUnused numbers are unused. Only one
@@ -49,7 +52,7 @@ class EndpointNumbers {
   Condition announced_;
   std::uint64_t next_ TFDUDE_GUARDED_BY(mutex_) = 1;
   Id last_id_ TFDUDE_GUARDED_BY(mutex_) = 0;
-  Id announcing_ TFDUDE_GUARDED_BY(mutex_) = 0;                            // 0: none
+  Id announcing_ TFDUDE_GUARDED_BY(mutex_) = kNone;
   std::map<std::uint64_t, Endpoint> endpoints_ TFDUDE_GUARDED_BY(mutex_);  // by number
   std::map<Id, std::uint64_t> numbers_ TFDUDE_GUARDED_BY(mutex_);
 };

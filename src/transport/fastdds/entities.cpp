@@ -3,6 +3,8 @@
 #include <set>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "base/log.hpp"
 
 namespace tfdude::fastdds {
@@ -27,6 +29,12 @@ void log_mismatch(const std::string& mismatch) {
   if (logged.insert(mismatch).second) log().error("{}", mismatch);
 }
 
+std::string endpoint_name(const char* kind, const std::string& topic,
+                          const std::string& partition) {
+  const std::string where = partition.empty() ? "the default one" : quote(partition);
+  return std::string("the ") + kind + " of topic " + topic + " in DDS partition " + where;
+}
+
 void log_not_announced() { log().warn("Fast DDS did not announce an endpoint again"); }
 
 Writer::Writer(const Context& context, edds::Topic& topic, const std::string& partition,
@@ -34,11 +42,18 @@ Writer::Writer(const Context& context, edds::Topic& topic, const std::string& pa
     : context_(context), on_reader_(std::move(on_reader)) {
   edds::PublisherQos qos = context.participant.get_default_publisher_qos();
   if (!partition.empty()) qos.partition().push_back(partition.c_str());
-  publisher_ = context.participant.create_publisher(qos);
-  if (publisher_ == nullptr) return;
-  writer_ =
-      publisher_->create_datawriter(&topic, context.profiles.writer(*publisher_, profile), this);
-  if (writer_ == nullptr) return;
+  const std::string name = endpoint_name("writer", topic.get_name(), partition);
+  check_ =
+      created("the publisher of " + name, [&] { return context.participant.create_publisher(qos); })
+          .and_then([&](edds::Publisher* publisher) {
+            publisher_ = publisher;
+            return created(name, [&] {
+              return publisher->create_datawriter(
+                  &topic, context.profiles.writer(*publisher, profile), this);
+            });
+          })
+          .map([&](edds::DataWriter* writer) { writer_ = writer; });
+  if (!check_) return;
   ++context_.counters.writers;
   number_ = context.announced.writers.created([this] { announce_again(*writer_); });
 }
@@ -56,6 +71,7 @@ bool Writer::wait_until_matched(Deadline deadline) {
 }
 
 bool Writer::write(void* sample) {
+  if (!good()) return false;
   // Sequence numbers and source timestamps are assigned in the same order.
   const std::lock_guard lock(writing_);
   const auto now = std::chrono::system_clock::now().time_since_epoch();

@@ -16,12 +16,13 @@
 
 #include "base/mutex.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/creation.hpp"
 #include "transport/fastdds/endpoint_numbers.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/growing_stamp.hpp"
 #include "transport/fastdds/profiles.hpp"
 
-// DDS entities with a lifetime. If the library could not create one, it is null inside: see good().
+// DDS entities with a lifetime. One that the library could not create is null inside: see check().
 namespace tfdude::fastdds {
 
 using Deadline = std::chrono::steady_clock::time_point;
@@ -36,6 +37,10 @@ struct Context {
 };
 
 void log_not_announced();
+
+/// Names a writer or reader for errors.
+[[nodiscard]] std::string endpoint_name(const char* kind, const std::string& topic,
+                                        const std::string& partition);
 
 /// Gives an endpoint that exists other user data, so that DDS announces it again.
 template <class Endpoint>
@@ -64,6 +69,8 @@ class Writer final : public edds::DataWriterListener {
   Writer& operator=(const Writer&) = delete;
 
   [[nodiscard]] bool good() const { return writer_ != nullptr; }
+  /// @return kTransport, with what could not be created; then nothing can be written
+  [[nodiscard]] const Result<void>& check() const { return check_; }
 
   /// Whether a reader has been discovered. Does not wait.
   [[nodiscard]] bool matched() const { return readers_ > 0; }
@@ -104,7 +111,8 @@ class Writer final : public edds::DataWriterListener {
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
   edds::DataWriter* writer_ = nullptr;
-  EndpointNumbers::Id number_ = 0;
+  Result<void> check_;
+  EndpointNumbers::Id number_ = EndpointNumbers::kNone;
   mutable Mutex mutex_;
   std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
@@ -139,11 +147,18 @@ class Reader : public edds::DataReaderListener {
       : context_(context), calls_(std::move(calls)) {
     edds::SubscriberQos qos = context.participant.get_default_subscriber_qos();
     if (!partition.empty()) qos.partition().push_back(partition.c_str());
-    subscriber_ = context.participant.create_subscriber(qos);
-    if (subscriber_ == nullptr) return;
-    reader_ = subscriber_->create_datareader(&topic, context.profiles.reader(*subscriber_, profile),
-                                             this);
-    if (reader_ == nullptr) return;
+    const std::string name = endpoint_name("reader", topic.get_name(), partition);
+    check_ = created("the subscriber of " + name,
+                     [&] { return context.participant.create_subscriber(qos); })
+                 .and_then([&](edds::Subscriber* subscriber) {
+                   subscriber_ = subscriber;
+                   return created(name, [&] {
+                     return subscriber->create_datareader(
+                         &topic, context.profiles.reader(*subscriber, profile), this);
+                   });
+                 })
+                 .map([&](edds::DataReader* reader) { reader_ = reader; });
+    if (!check_) return;
     number_ = context.announced.readers.created([this] { announce_again(*reader_); });
   }
 
@@ -151,10 +166,11 @@ class Reader : public edds::DataReaderListener {
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;
 
-  [[nodiscard]] bool good() const { return reader_ != nullptr; }
+  /// @return kTransport, with what could not be created
+  [[nodiscard]] const Result<void>& check() const { return check_; }
 
   void close() {
-    context_.announced.readers.deleted(std::exchange(number_, 0));
+    context_.announced.readers.deleted(std::exchange(number_, EndpointNumbers::kNone));
     const Gate::Pause pause(context_.gate);
     if (reader_ != nullptr) subscriber_->delete_datareader(reader_);
     if (subscriber_ != nullptr) context_.participant.delete_subscriber(subscriber_);
@@ -203,7 +219,8 @@ class Reader : public edds::DataReaderListener {
   std::deque<Taken> batch_ TFDUDE_GUARDED_BY(mutex_);  // kept, for their memory
   edds::Subscriber* subscriber_ = nullptr;
   edds::DataReader* reader_ = nullptr;
-  EndpointNumbers::Id number_ = 0;
+  Result<void> check_;
+  EndpointNumbers::Id number_ = EndpointNumbers::kNone;
 };
 
 }  // namespace tfdude::fastdds

@@ -42,10 +42,6 @@ std::chrono::nanoseconds nanoseconds_of(const Duration& duration) {
   return std::chrono::seconds(duration.seconds) + std::chrono::nanoseconds(duration.nanosec);
 }
 
-tl::unexpected<Error> not_created(const char* what) {
-  return fail(Errc::kTransport, std::string("Fast DDS could not create ") + what);
-}
-
 }  // namespace
 
 FastDdsTransport::FastDdsTransport(FastDdsOptions options)
@@ -89,15 +85,15 @@ Result<void> FastDdsTransport::create_participant() {
   // The time may be published by a client.
   const bool owners_only = options_.partition.empty() && !handler_->wants_clock();
   discovery_gate_.prepare(qos, options_.domain, owners_only);
-  participant_ = edds::DomainParticipantFactory::get_instance()->create_participant(
-      options_.domain, qos, &participant_listener_, edds::StatusMask::none());
-  if (participant_ == nullptr) {
-    return fail(Errc::kTransport,
-                "Fast DDS could not join domain " + std::to_string(options_.domain));
-  }
+  const auto joined = created("a participant in domain " + std::to_string(options_.domain), [&] {
+    return edds::DomainParticipantFactory::get_instance()->create_participant(
+        options_.domain, qos, &participant_listener_, edds::StatusMask::none());
+  });
+  if (!joined) return tl::unexpected(joined.error());
+  participant_ = *joined;
   discovery_gate_.open();
   self_ = peer_of(participant_->guid().guidPrefix);
-  return create_topics(*participant_, topics_) ? Result<void>() : not_created("the topics");
+  return create_topics(*participant_, topics_);
 }
 
 // The profile's lease is used only to detect loss here; DDS itself keeps a match for longer (see
@@ -150,36 +146,37 @@ Result<void> FastDdsTransport::create_endpoints() {
             if (change <= 0) return reply_paths_.closed(writer);
             reply_paths_.opened(writer, owner_of_replies(writer_partitions_.of(writer)));
           }});
-  if (!presence_->good() || (pages_ != nullptr && !pages_->good()) || !replies_->good() ||
-      !clock_->good()) {
-    return not_created("the readers");
-  }
+  if (!presence_->check()) return presence_->check();
+  if (pages_ != nullptr && !pages_->check()) return pages_->check();
+  if (!replies_->check()) return replies_->check();
+  if (auto clock = clock_->check(); !clock) return clock;
   const std::string& own = options_.partition;
   if (own.empty()) return {};
   presence_writer_ = std::make_unique<Writer>(context(), *topics_.presence, own, "presence_writer");
   directory_writer_ =
       std::make_unique<Writer>(context(), *topics_.directory, own, "directory_writer");
-  if (!presence_writer_->good() || !directory_writer_->good()) {
-    return not_created("the writers");
-  }
-  return {};
+  return presence_writer_->check() ? directory_writer_->check() : presence_writer_->check();
 }
 
-edds::ContentFilteredTopic* FastDdsTransport::create_filtered(edds::Topic* topic,
-                                                              const std::string& partition) {
-  return participant_->create_contentfilteredtopic(topic->get_name() + " of " + partition, topic,
-                                                   partition, {}, OwnedFilters::kClassName);
+Result<edds::ContentFilteredTopic*> FastDdsTransport::create_filtered(
+    edds::Topic* topic, const std::string& partition) {
+  const std::string name = topic->get_name() + " of " + partition;
+  return created("the filtered topic " + name, [&] {
+    return participant_->create_contentfilteredtopic(name, topic, partition, {},
+                                                     OwnedFilters::kClassName);
+  });
 }
 
 // A peer that matches our reader is going to ask: the writer for its replies is created while its
 // request is on the way.
-std::unique_ptr<Reader<wire::Request>> FastDdsTransport::request_reader(
-    edds::Topic* topic, const std::string& partition, bool may_change) {
-  auto* filtered = create_filtered(topic, partition);
-  if (filtered == nullptr) return nullptr;
+Result<void> FastDdsTransport::read_requests(std::unique_ptr<Reader<wire::Request>>& reader,
+                                             edds::Topic* topic, const std::string& partition,
+                                             bool may_change) {
+  const auto filtered = create_filtered(topic, partition);
+  if (!filtered) return tl::unexpected(filtered.error());
   using Requests = Reader<wire::Request>;
-  auto reader = std::make_unique<Requests>(
-      context(), *filtered, partition, "call_reader",
+  reader = std::make_unique<Requests>(
+      context(), **filtered, partition, "call_reader",
       Requests::Calls{
           accounted([this, may_change](const wire::Request& sample, const edds::SampleInfo& info) {
             take_request(sample, writer_of(info).guidPrefix, may_change);
@@ -188,37 +185,40 @@ std::unique_ptr<Reader<wire::Request>> FastDdsTransport::request_reader(
             if (change <= 0) return;
             worker_->post([this, peer = peer_of(from.guidPrefix)] { open_reply_writer(peer); });
           }});
-  return reader->good() ? std::move(reader) : nullptr;
+  return reader->check();
 }
 
 Result<void> FastDdsTransport::serve(const std::string& partition) {
   using Info = edds::SampleInfo;
   filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_, fair_share_);
-  if (!ok(participant_->register_content_filter_factory(OwnedFilters::kClassName,
-                                                        filters_.get()))) {
-    return not_created("the filter");
+  const auto filters = created("the filters of partition " + quote(partition), [&] {
+    const bool known =
+        ok(participant_->register_content_filter_factory(OwnedFilters::kClassName, filters_.get()));
+    return known ? filters_.get() : nullptr;
+  });
+  if (!filters) return tl::unexpected(filters.error());
+  if (auto requests = read_requests(requests_, topics_.request, partition, false); !requests) {
+    return requests;
   }
-  requests_ = request_reader(topics_.request, partition, false);
-  changes_ = request_reader(topics_.change, partition, true);
-  auto* updates = create_filtered(topics_.update, partition);
-  if (requests_ == nullptr || changes_ == nullptr || updates == nullptr) {
-    return not_created("the readers of requests");
+  if (auto changes = read_requests(changes_, topics_.change, partition, true); !changes) {
+    return changes;
   }
+  const auto updates = create_filtered(topics_.update, partition);
+  if (!updates) return tl::unexpected(updates.error());
   updates_ = std::make_unique<Reader<wire::Update>>(
-      context(), *updates, partition, "update_reader",
+      context(), **updates, partition, "update_reader",
       Reader<wire::Update>::Calls{
           accounted([this](const wire::Update& sample, const Info&) { take_update(sample); }),
           nullptr});
-  if (!updates_->good()) return not_created("the readers");
-  if (!handler_->owns_joints()) return {};
-  auto* joints = create_filtered(topics_.joint, partition);
-  if (joints == nullptr) return not_created("the filter of joints");
+  if (!updates_->check() || !handler_->owns_joints()) return updates_->check();
+  const auto joints = create_filtered(topics_.joint, partition);
+  if (!joints) return tl::unexpected(joints.error());
   joints_ = std::make_unique<Reader<wire::Joints>>(
-      context(), *joints, partition, "update_reader",
+      context(), **joints, partition, "update_reader",
       Reader<wire::Joints>::Calls{
           accounted([this](const wire::Joints& sample, const Info&) { take_joints(sample); }),
           nullptr});
-  return joints_->good() ? Result<void>() : not_created("the reader of joints");
+  return joints_->check();
 }
 
 // A discovery server forwards several times per second, one step of the discovery at a time.
@@ -291,7 +291,9 @@ Result<void> FastDdsTransport::publish_clock(Time now) {
 
 // No writer is created for a peer that has left: nothing would delete it.
 void FastDdsTransport::open_reply_writer(const PeerId& peer) {
-  if (there_.count(peer) != 0) (void)reply_writers_.open(peer);
+  if (there_.count(peer) == 0) return;
+  const auto writer = reply_writers_.open(peer);
+  if (!writer->good()) log_not_created("no replies are sent", writer->check().error());
 }
 
 void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
@@ -302,13 +304,12 @@ void FastDdsTransport::reply(const PeerId& to, const Reply& reply) {
 
 void FastDdsTransport::reply(const PeerId& to, wire::Reply& sample) {
   if (const auto writer = reply_writers_.find(to)) {
-    if (writer->good()) writer->write(&sample);
+    writer->write(&sample);
     return;
   }
   worker_->post([this, to, late = sample]() mutable {
     open_reply_writer(to);
-    const auto writer = reply_writers_.find(to);
-    if (writer != nullptr && writer->good()) writer->write(&late);
+    if (const auto writer = reply_writers_.find(to)) writer->write(&late);
   });
 }
 

@@ -99,10 +99,10 @@ class FastDdsTransport final : public Transport {
   Result<void> create_participant();
   Result<void> create_endpoints();
   void take_times(edds::DomainParticipantQos& qos);
-  edds::ContentFilteredTopic* create_filtered(edds::Topic* topic, const std::string& partition);
-  std::unique_ptr<Reader<wire::Request>> request_reader(edds::Topic* topic,
-                                                        const std::string& partition,
-                                                        bool may_change);
+  Result<edds::ContentFilteredTopic*> create_filtered(edds::Topic* topic,
+                                                      const std::string& partition);
+  Result<void> read_requests(std::unique_ptr<Reader<wire::Request>>& reader, edds::Topic* topic,
+                             const std::string& partition, bool may_change);
   [[nodiscard]] Context context() {
     return {*participant_, *profiles_, *gate_, *counters_, announced_};
   }

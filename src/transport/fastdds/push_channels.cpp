@@ -15,9 +15,9 @@ std::string partition_of(const std::string& owner, std::uint64_t group) {
 }  // namespace
 
 Result<void> PushChannels::watch(const std::string& owner, std::uint64_t group) {
+  std::unique_ptr<Reader<wire::State>> reader;  // outlives the lock: see unwatch()
   const Lock lock(mutex_);
-  auto& reader = readers_[group];
-  if (reader != nullptr) return {};
+  if (readers_.count(group) != 0) return {};
   reader = std::make_unique<Reader<wire::State>>(
       context_, topic_, partition_of(owner, group), "update_reader",
       Reader<wire::State>::Calls{[this](const wire::State& sample, const edds::SampleInfo&) {
@@ -28,9 +28,9 @@ Result<void> PushChannels::watch(const std::string& owner, std::uint64_t group) 
                                    }
                                  },
                                  nullptr});
-  if (reader->good()) return {};
-  readers_.erase(group);
-  return fail(Errc::kTransport, "Fast DDS could not make a reader of what is watched");
+  if (!reader->check()) return reader->check();
+  readers_.emplace(group, std::move(reader));
+  return {};
 }
 
 // Closed without the lock: a callback that delivers a DDS sample may be waiting for it.
@@ -52,10 +52,11 @@ void PushChannels::push(const PushedValues& pushed) {
       entry = std::make_shared<Writer>(context_, topic_, partition_of(own_, pushed.group),
                                        "update_writer",
                                        [this, group = pushed.group] { calls_.on_watcher(group); });
+      if (!entry->good()) log_not_created("values are not pushed", entry->check().error());
     }
     writer = entry;
   }
-  if (!writer->good()) return;
+  if (!writer->good()) return;      // until the group ends
   thread_local wire::State sample;  // kept, for its memory
   write_wire(pushed, sample);
   writer->write(&sample);

@@ -85,7 +85,7 @@ Result<void> Senders::send(Writer& writer, const std::string& partition, void* s
 }
 
 Result<void> Senders::await_match(Writer& writer, const std::string& partition, Deadline deadline) {
-  if (!writer.good()) return fail(Errc::kTransport, "Fast DDS could not create a writer");
+  if (!writer.good()) return writer.check();
   parts_.attention.pay(writer);
   while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + kWaitStep))) {
     if (parts_.peers.silent(partition)) {
@@ -148,7 +148,7 @@ std::set<std::string> Senders::askable(const std::set<std::string>& partitions) 
   for (const std::string& partition : partitions) {
     // Who only sends a stream has none yet.
     const auto writer = requests_.open(partition);
-    if (writer->good() && writer->matched()) askable.insert(partition);
+    if (writer->matched()) askable.insert(partition);
   }
   return askable;
 }

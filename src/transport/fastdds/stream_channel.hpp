@@ -21,7 +21,8 @@ class StreamChannel final : public Channel<Message> {
 
   std::optional<Errc> try_send(const Message& message) override {
     if (writer_ == nullptr) return Errc::kNotPermitted;
-    if (!writer_->good() || !writer_->matched()) return Errc::kTimeout;
+    if (!writer_->good()) return Errc::kTransport;
+    if (!writer_->matched()) return Errc::kTimeout;
     attention_.pay(*writer_);
     write_wire(message, sample_);
     return writer_->write(&sample_) ? std::nullopt : std::optional<Errc>(Errc::kTimeout);

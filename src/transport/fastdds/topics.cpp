@@ -1,13 +1,22 @@
 #include "transport/fastdds/topics.hpp"
 
+#include <string>
+
 #include "base/log.hpp"
+#include "transport/fastdds/creation.hpp"
 
 namespace tfdude::fastdds {
 
-bool create_topics(edds::DomainParticipant& participant, Topics& topics) {
+Result<void> create_topics(edds::DomainParticipant& participant, Topics& topics) {
+  Result<void> outcome;
   const auto create = [&](const char* name, const edds::TypeSupport& type) -> edds::Topic* {
-    if (!ok(type.register_type(&participant))) return nullptr;
-    return participant.create_topic(name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+    if (!outcome) return nullptr;
+    const auto topic = created(std::string("the topic ") + name, [&]() -> edds::Topic* {
+      if (!ok(type.register_type(&participant))) return nullptr;
+      return participant.create_topic(name, type.get_type_name(), edds::TOPIC_QOS_DEFAULT);
+    });
+    if (!topic) outcome = tl::unexpected(topic.error());
+    return topic.value_or(nullptr);
   };
   topics.presence = create(kPresenceTopic, edds::TypeSupport(new PresenceType));
   topics.directory = create(kDirectoryTopic, edds::TypeSupport(new PageType));
@@ -18,9 +27,7 @@ bool create_topics(edds::DomainParticipant& participant, Topics& topics) {
   topics.joint = create(kJointTopic, edds::TypeSupport(new JointsType));
   topics.state = create(kStateTopic, edds::TypeSupport(new StateType));
   topics.clock = create(kClockTopic, edds::TypeSupport(new ClockType));
-  return topics.presence != nullptr && topics.directory != nullptr && topics.reply != nullptr &&
-         topics.request != nullptr && topics.change != nullptr && topics.update != nullptr &&
-         topics.joint != nullptr && topics.state != nullptr && topics.clock != nullptr;
+  return outcome;
 }
 
 void count_malformed(FastDdsCounters& counters, const char* topic) {

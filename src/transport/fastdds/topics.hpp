@@ -31,8 +31,8 @@ struct Topics {
   edds::Topic* presence = nullptr;
 };
 
-/// Registers their types and creates them. @return false if one could not be created
-[[nodiscard]] bool create_topics(edds::DomainParticipant& participant, Topics& topics);
+/// Registers their types and creates them. @return kTransport, naming one that could not be created
+[[nodiscard]] Result<void> create_topics(edds::DomainParticipant& participant, Topics& topics);
 
 /// Counts a sample that was dropped as not well formed, and logs the 1st, 2nd, 4th, 8th...
 void count_malformed(FastDdsCounters& counters, const char* topic);

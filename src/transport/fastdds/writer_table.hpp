@@ -28,12 +28,13 @@ class WriterTable {
     return known != writers_.end() ? known->second : nullptr;
   }
 
-  /// Creates the writer at the first use.
+  /// Creates the writer at the first use. One that could not be created is not kept.
   std::shared_ptr<Writer> open(const Key& key) {
     if (auto known = find(key)) return known;
     const Lock creating(creating_);
     if (auto known = find(key)) return known;
     auto created = create_(key);
+    if (!created->good()) return created;
     const Lock lock(mutex_);
     writers_.emplace(key, created);
     return created;

@@ -86,4 +86,13 @@ TEST_CASE("endpoint numbers: an endpoint is not deleted while it is announced ag
   CHECK(numbers.unused() == 0);
 }
 
+TEST_CASE("endpoint numbers: the deletion of one that was never created does not wait") {
+  EndpointNumbers numbers;
+  numbers.deleted(EndpointNumbers::kNone);
+  const auto first = numbers.created([] {});
+  numbers.deleted(EndpointNumbers::kNone);
+  numbers.deleted(first);
+  CHECK(numbers.unused() == 0);
+}
+
 }  // namespace tfdude::fastdds

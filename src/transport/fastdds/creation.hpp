@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <type_traits>
+
+#include "tfdude/base/result.hpp"
+
+// The creation of DDS entities, which may fail: the library then returns null.
+namespace tfdude::fastdds {
+
+/// Whether a creation fails, as for a test. @param what  as in the error
+using FailCreation = std::function<bool(const std::string& what)>;
+
+/// From now on creations fail for which this returns true; null: none but those that do. For tests.
+void fail_creations(FailCreation fails);
+
+[[nodiscard]] bool creation_fails(const std::string& what);
+
+[[nodiscard]] tl::unexpected<Error> not_created(const std::string& what);
+
+/// Logs what does not happen because of that, the 1st, 2nd, 4th, 8th... time.
+void log_not_created(const char* consequence, const Error& error);
+
+/// All entities are created through this. @return kTransport, with what could not be created
+template <class Create>
+[[nodiscard]] Result<std::invoke_result_t<Create>> created(const std::string& what, Create create) {
+  auto* entity = creation_fails(what) ? nullptr : create();
+  if (entity == nullptr) return not_created(what);
+  return entity;
+}
+
+}  // namespace tfdude::fastdds
