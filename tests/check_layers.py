@@ -55,6 +55,14 @@ CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\
 CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store", "keys",
              "recording"]
 
+# Numbers are written by tfdude/base/number.hpp, and read by std::from_chars(). Streams and these functions follow the
+# locale of the program. Our own programs never set one.
+LOCALE_SET = re.compile(r"\bsetlocale\b|\blocale::global\b")
+LOCALE_WORDS = re.compile(LOCALE_SET.pattern + r"|\b(i|o)?stringstream\b|\b(sto(d|f|ld)|strto(d|f|ld)|atof)\b")
+LOCALE_FORMAT = re.compile(r'"(?:\\.|[^"\\\n])*%[-+#0]*[0-9*]*(\.[0-9*]+)?l?[aefgAEFG](?:\\.|[^"\\\n])*"')
+# Read words, or in the locale of C.
+LOCALE_FREE = ["src/description/yaml_quirks.cpp", "src/keys/authority.cpp", "src/transport/fastdds/announcement.cpp"]
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_LITERAL = re.compile(
     r'//[^\n]*|/\*.*?\*/|R"([^(\s]*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.DOTALL)
@@ -143,6 +151,15 @@ class Checker:
         if target.startswith(DDS_FOLDER) and not path.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "confined", f'"{name}" may bring DDS along: only in {DDS_FOLDER}')
 
+    def check_locale(self, path, layer, text):
+        """Numbers in messages, files and texts are the same in each locale."""
+        found = [(LOCALE_SET if layer == "apps" else LOCALE_WORDS, strip_comments(text, literals_too=True))]
+        if layer != "apps":
+            found.append((LOCALE_FORMAT, strip_comments(text)))
+        for pattern, code in found if path not in LOCALE_FREE else []:
+            for match in pattern.finditer(code):
+                self.report(path, match.start(), "locale", "depends on the locale: use tfdude/base/number.hpp")
+
     def check_listed(self):
         """Each public header is in the file set: installed, and compiled alone by the dev preset."""
         listing = self.root / "src/CMakeLists.txt"
@@ -177,6 +194,7 @@ class Checker:
             if layer in CLOCKLESS:
                 for match in CLOCK.finditer(strip_comments(text, literals_too=True)):
                     self.report(path, match.start(), "clock", f"{layer} is handed the time, it reads no clock")
+            self.check_locale(path, layer, text)
         self.check_listed()
         if not any(rule == "arrow" for rule, _ in self.findings):
             self.check_picture()
@@ -198,7 +216,7 @@ class SelfTest(unittest.TestCase):
         "src/transport/fastdds/wire.cpp": '#include <fastdds/dds/core.hpp>\n#include "wire.h"\n',
         "src/transport/fastdds/entity.hpp": "#include <fastdds/dds/core.hpp>\n",
         "src/description/config.cpp": "#include <yaml-cpp/yaml.h>\n",
-        "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\n',
+        "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\nlog("50 % of 3", "%04o");\n',
         "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
         "python/src/module.cpp": '#include <pybind11/pybind11.h>\n#include "tfdude/tree/forest.hpp"\n',
         "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
@@ -253,6 +271,10 @@ class SelfTest(unittest.TestCase):
         ("clock", "src/partition/a.cpp", "auto t = std::chrono::system_clock::now();\n"),
         ("clock", "src/tree/a.cpp", "auto t = Clock::now ();\n"),
         ("clock", "src/math/a.cpp", "auto t = std::time(nullptr);\n"),
+        ("locale", "src/runtime/a.cpp", "std::ostringstream text;\n"),
+        ("locale", "python/src/a.cpp", "double x = std::strtod(text, nullptr);\n"),
+        ("locale", "src/math/a.cpp", 'std::snprintf(text, 32, "at %8.3f m", x);\n'),
+        ("locale", "apps/tfdude/a.cpp", 'std::setlocale(LC_ALL, "");\n'),
         ("place", "src/a.cpp", "int a;\n"),
         ("place", "src/unheard_of/a.cpp", "int a;\n"),
         ("listed", "include/tfdude/tree/unlisted.hpp", "\n"),

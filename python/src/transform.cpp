@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <array>
-#include <sstream>
 
 #include <pybind11/operators.h>
 
+#include "tfdude/base/number.hpp"
 #include "tfdude/math/interpolate.hpp"
 #include "tfdude/math/perturbation.hpp"
 
@@ -41,32 +41,31 @@ std::string missing(const std::vector<std::string>& unspecified) {
 
 /// "Transform(translation=[...], quaternion=[...], stddev=...)", short enough for a prompt.
 std::string text_of(const Transform& X, const std::string& name) {
-  std::ostringstream text;
-  text.precision(6);
+  std::string text;
   const auto list = [&](std::initializer_list<double> values) {
     const char* before = "[";
     for (const double value : values) {
-      text << before << value + 0.0;  // no zero has a sign
+      text += before + number_text(value + 0.0);  // no zero has a sign
       before = ", ";
     }
-    text << "]";
+    text += "]";
   };
   const Eigen::Vector3d p = X.pose.translation();
   const Eigen::Quaterniond q = X.pose.rotation();
-  text << name << "(translation=";
+  text += name + "(translation=";
   list({p.x(), p.y(), p.z()});
-  text << ", quaternion=";
+  text += ", quaternion=";
   list({q.x(), q.y(), q.z(), q.w()});
   if (!X.covariance.complete()) {
-    text << ", covariance='unspecified'";
+    text += ", covariance='unspecified'";
   } else if (X.covariance == StatedCovariance::exact()) {
-    text << ", covariance='exact'";
+    text += ", covariance='exact'";
   } else {
-    text << ", stddev=";
+    text += ", stddev=";
     const std::array<double, 6> s = X.covariance.of_specified().stddev();
     list({s[0], s[1], s[2], s[3], s[4], s[5]});
   }
-  return text.str() + ")";
+  return text + ")";
 }
 
 StatedCovariance converted(py::handle self, StatedCovariance (*convert)(const Transform&)) {

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <ctime>
 
+#include "tfdude/base/number.hpp"
+
 namespace tfdude {
 
 const char* to_string(ClockKind kind) {
@@ -12,10 +14,8 @@ const char* to_string(ClockKind kind) {
 }
 
 std::string in_milliseconds(std::chrono::nanoseconds duration) {
-  std::array<char, 32> text{};
   const double ms = static_cast<double>(duration.count()) * 1e-6;
-  std::snprintf(text.data(), text.size(), std::abs(ms) < 0.1 ? "%.6f ms" : "%.3f ms", ms);
-  return text.data();
+  return fixed_text(ms, std::abs(ms) < 0.1 ? 6 : 3) + " ms";
 }
 
 std::string to_string(Time time) {

@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 
 namespace tfdude {
 namespace {
 
 // The largest position or limit [rad or m], multiplier and offset. Up to it no variance overflows.
 constexpr double kLargest = 1e9;
-
-std::string written(double value) {
-  std::ostringstream out;
-  out << value;
-  return out.str();
-}
 
 bool is_sane(double value) { return std::abs(value) <= kLargest; }  // false for NaN
 
@@ -147,7 +141,7 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   const auto& limits = urdf_of(i).limits;
   if (!limits) return {};
   joint.limits = JointLimits{limits->lower, limits->upper};
-  const std::string both = written(limits->lower) + " and " + written(limits->upper);
+  const std::string both = number_text(limits->lower) + " and " + number_text(limits->upper);
   if (!(limits->lower <= limits->upper)) {
     return tree_.joint_error(i, "limits " + both + ": the lower limit is above the upper one");
   }
@@ -175,16 +169,17 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
   }
   joint.position = said.position.value_or(rest_position(joint.limits));
   if (!is_sane(joint.position)) {
-    return tree_.joint_error(i, "position " + written(joint.position) + " is beyond 1e9");
+    return tree_.joint_error(i, "position " + number_text(joint.position) + " is beyond 1e9");
   }
   const auto& limits = joint.limits;
   if (limits && !limits->contain(joint.position)) {
-    return tree_.joint_error(i, "position " + written(joint.position) + " is outside its limits " +
-                                    written(limits->lower) + " and " + written(limits->upper));
+    return tree_.joint_error(i, "position " + number_text(joint.position) +
+                                    " is outside its limits " + number_text(limits->lower) +
+                                    " and " + number_text(limits->upper));
   }
   for (const auto& stddev : {said.stddev, said.sample_stddev}) {
     if (!stddev || (*stddev >= 0 && is_sane(*stddev))) continue;
-    return tree_.joint_error(i, "stddev " + written(*stddev) + " is not within 0 and 1e9");
+    return tree_.joint_error(i, "stddev " + number_text(*stddev) + " is not within 0 and 1e9");
   }
   joint.variance = said.stddev ? *said.stddev * *said.stddev
                                : unmeasured_variance(joint.type, range_of(joint), joint.position);

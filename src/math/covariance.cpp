@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
+
+#include "tfdude/base/number.hpp"
 
 #include "math/columns.hpp"
 #include "math/semidefinite.hpp"
@@ -22,12 +23,6 @@ constexpr double kPsdTolerance = 1e-9;
 // variance. An axis that is known exactly, up to rounding, must not be judged by its rounding
 // error.
 constexpr double kAxisShare = 1e-3;
-
-std::string number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%g", value);
-  return text.data();
-}
 
 std::string element(std::size_t row, std::size_t column) {
   return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
@@ -76,7 +71,7 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
     return fail(Errc::kInvalidInput,
                 "covariance is not positive semi-definite: the smallest eigenvalue "
                 "of its correlation matrix is " +
-                    number(smallest));
+                    number_text(smallest));
   }
   if (smallest >= 0) return upper;
   const Twist back = scale.unaryExpr([](double s) { return s > 0 ? 1.0 / s : 0.0; });

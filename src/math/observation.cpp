@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 #include "tfdude/math/fusion.hpp"
 #include "tfdude/math/perturbation.hpp"
 
@@ -323,7 +324,7 @@ Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transf
                             const std::string& source, const ObserveOptions& options) {
   if (!(options.gate > 0 && options.gate <= 1)) {
     return fail(Errc::kInvalidInput,
-                "gate must be above 0 and no more than 1, not " + std::to_string(options.gate));
+                "gate must be above 0 and no more than 1, not " + number_text(options.gate));
   }
   if (!Z_AB.covariance.complete()) {
     return fail(Errc::kInvalidInput,

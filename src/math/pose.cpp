@@ -1,10 +1,10 @@
 #include "tfdude/math/pose.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
+
+#include "tfdude/base/number.hpp"
 
 namespace tfdude {
 namespace {
@@ -35,9 +35,8 @@ tl::unexpected<Error> what_is_wrong(const Eigen::Quaterniond& rotation,
       return fail(Errc::kInvalidInput, field + " is beyond 1e9 m");
     }
   }
-  std::array<char, 32> norm{};
-  std::snprintf(norm.data(), norm.size(), "%g", rotation.coeffs().stableNorm());
-  return fail(Errc::kInvalidInput, std::string("rotation has the norm ") + norm.data() +
+  return fail(Errc::kInvalidInput, "rotation has the norm " +
+                                       number_text(rotation.coeffs().stableNorm()) +
                                        ", not that of a unit quaternion");
 }
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 
 namespace tfdude {
 namespace {
@@ -20,11 +20,11 @@ Correlation shared_error(const JointSpec& spec, std::optional<double> variance) 
 }
 
 Error beyond_limits(const JointSpec& spec, double position) {
-  std::ostringstream message;
-  message.precision(12);
-  message << "joint " << quote(spec.name) << ": position " << position << " is outside its limits, "
-          << spec.limits->lower << " to " << spec.limits->upper;
-  return {Errc::kInvalidInput, message.str()};
+  constexpr int kDigits = 12;
+  return {Errc::kInvalidInput, "joint " + quote(spec.name) + ": position " +
+                                   number_text(position, kDigits) + " is outside its limits, " +
+                                   number_text(spec.limits->lower, kDigits) + " to " +
+                                   number_text(spec.limits->upper, kDigits)};
 }
 
 }  // namespace

@@ -2,10 +2,10 @@
 
 #include <chrono>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 
 namespace tfdude {
 namespace {
@@ -13,10 +13,9 @@ namespace {
 Result<void> check_rate(double rate) {
   constexpr double kLeast = 1.0 / std::chrono::duration<double>(kMaxWatchPeriod).count();
   if (rate == 0 || (rate >= kLeast && rate <= 1e6)) return {};
-  std::ostringstream text;
-  text << rate;
-  return fail(Errc::kInvalidInput,
-              "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + text.str());
+  return fail(
+      Errc::kInvalidInput,
+      "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + number_text(rate));
 }
 
 std::chrono::nanoseconds period_of(double rate) {

@@ -1,6 +1,9 @@
 // The service over several hosts: network namespaces, each with its own address.
 
+#include "tfdude/client/node.hpp"
+
 #include "hosts/robot_hosts.hpp"
+#include "support/german_locale.hpp"
 
 namespace tfdude {
 namespace {
@@ -75,6 +78,22 @@ TEST_CASE("hosts: a discovery server may start late and restart") {
   r.start_server_again();
   auto late = r.open_client(RobotHosts::kArms);
   check_agreement(r, late);
+}
+
+TEST_CASE("hosts: a program with a German locale meets those of other hosts") {
+  if (testing::skip_without_hosts()) return;
+  const bool by_server = GENERATE(false, true);
+  RobotHosts r(by_server);
+  if (by_server) r.start_server();
+  r.start_daemons();
+  const testing::GermanLocale german;
+  auto client = Client::open(r.options()).value();
+  check_agreement(r, client);
+  auto node = Node::open("german", {{"desk", "", {}}, {"cup", "desk", kX}}, r.options()).value();
+  CHECK(node.lookup("world", "tool"));
+  const auto answer = r.cli(RobotHosts::kArms, {"lookup", "desk", "cup"});
+  INFO(answer.err);
+  CHECK(answer.status == 0);
 }
 
 }  // namespace tfdude

@@ -2,11 +2,11 @@
 
 #include <array>
 #include <filesystem>
-#include <sstream>
 #include <string_view>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 #include "tfdude/math/transform_spec.hpp"
 
 #include "description/file_text.hpp"
@@ -112,10 +112,9 @@ Result<void> Reader::within(const Fields& fields, std::string_view key, const st
     out = *value;
     return {};
   }
-  std::ostringstream range;
-  range << " is not within " << least << " and " << most;
   return error(Errc::kInvalidInput, fields.find(key)->second.mark,
-               place + ": " + std::string(key) + range.str());
+               place + ": " + std::string(key) + " is not within " + number_text(least) + " and " +
+                   number_text(most));
 }
 
 Result<void> Reader::require(const YAML::Node& node, const Fields& fields, std::string_view key,

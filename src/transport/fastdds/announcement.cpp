@@ -1,5 +1,6 @@
 #include "transport/fastdds/announcement.hpp"
 
+#include <locale>
 #include <sstream>
 
 #include "tfdude/base/id.hpp"
@@ -32,6 +33,7 @@ Announcement read_announcement(const std::string& name, const std::vector<std::u
   said.is_ours = true;
   if (serves) said.partition = printable(name.substr(std::string(kServer).size()));
   std::istringstream text(std::string(data.begin(), data.end()));
+  text.imbue(std::locale::classic());
   std::string word;
   ProtocolVersion protocol;
   const bool has_version =

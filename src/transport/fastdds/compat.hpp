@@ -60,6 +60,7 @@
 #include <tfdudePubSubTypes.hpp>
 #endif
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -109,7 +110,10 @@ inline constexpr std::array<std::pair<const char*, const char*>, 0> kRenamedElem
 /// also identifies a server by its id: 0 by default, as for the servers.
 inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps::Locator_t& at) {
   etransport::RemoteServerAttributes server;
-  server.ReadguidPrefix("44.53.00.5f.45.50.52.4f.53.49.4d.41");
+  // Not as text, which Fast DDS reads with the locale of the program.
+  constexpr std::array<ertps::octet, 12> kServer{0x44, 0x53, 0x00, 0x5f, 0x45, 0x50,
+                                                 0x52, 0x4f, 0x53, 0x49, 0x4d, 0x41};
+  std::copy(kServer.begin(), kServer.end(), server.guidPrefix.value);
   server.metatrafficUnicastLocatorList.push_back(at);
   discovery.discoveryProtocol = DiscoveryProtocol::CLIENT;
   discovery.m_DiscoveryServers = {server};

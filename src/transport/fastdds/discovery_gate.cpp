@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "transport/fastdds/addresses.hpp"
 #include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/outgoing.hpp"
 #include "transport/fastdds/send_throttle.hpp"
@@ -77,6 +78,23 @@ class GatedTransport final : public SendFilter {
       : SendFilter(descriptor), descriptor_(descriptor), pace_(descriptor.client) {}
 
   etransport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+  // Fast DDS reads these addresses as text, with the locale of the program: where the point
+  // separates thousands, it gets none.
+  bool getDefaultMetatrafficMulticastLocators(ertps::LocatorList_t& locators,
+                                              std::uint32_t port) const override {
+    if (!SendFilter::getDefaultMetatrafficMulticastLocators(locators, port)) return false;
+    name_group(locators);
+    return true;
+  }
+  void AddDefaultOutputLocator(ertps::LocatorList_t& locators) override {
+    SendFilter::AddDefaultOutputLocator(locators);
+    name_group(locators);
+  }
+  ertps::LocatorList_t NormalizeLocator(const ertps::Locator_t& locator) override {
+    if (!ertps::IPLocator::isAny(locator)) return SendFilter::NormalizeLocator(locator);
+    return named(locator, [this](const ertps::Locator_t& own) { return is_locator_allowed(own); });
+  }
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
@@ -150,8 +168,8 @@ void hear_by_unicast_only(edds::DomainParticipantQos& qos, std::uint32_t domain)
   ertps::Locator_t everywhere;
   ertps::IPLocator::setIPv4(everywhere, 0, 0, 0, 0);
   builtin.metatrafficUnicastLocatorList.push_back(everywhere);
-  ertps::Locator_t group;  // of RTPS 2.2, section 9.6.1.4.1
-  ertps::IPLocator::setIPv4(group, 239, 255, 0, 1);
+  ertps::Locator_t group;
+  name_group(group);
   group.port = qos.wire_protocol().port.getMulticastPort(domain);
   builtin.initialPeersList.push_back(group);
 }

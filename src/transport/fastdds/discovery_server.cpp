@@ -10,8 +10,6 @@
 #include <optional>
 #include <sys/socket.h>
 
-#include <arpa/inet.h>
-
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
@@ -53,7 +51,7 @@ namespace fastdds {
 namespace {
 
 // Names are not resolved by Fast DDS, because its versions differ in this.
-Result<std::string> resolve(const std::string& host) {
+Result<ertps::Locator_t> resolve(const std::string& host) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
@@ -66,9 +64,12 @@ Result<std::string> resolve(const std::string& host) {
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> owned(found, &freeaddrinfo);
   sockaddr_in address{};
   std::memcpy(&address, found->ai_addr, sizeof address);
-  std::array<char, INET_ADDRSTRLEN> text{};
-  inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size());
-  return std::string(text.data());
+  // Not as text, which Fast DDS reads with the locale of the program.
+  std::array<unsigned char, sizeof address.sin_addr> bytes{};
+  std::memcpy(bytes.data(), &address.sin_addr, bytes.size());
+  ertps::Locator_t at;
+  ertps::IPLocator::setIPv4(at, bytes.data());
+  return at;
 }
 
 }  // namespace
@@ -81,8 +82,7 @@ Result<void> use_discovery_server(edds::DomainParticipantQos& qos, const std::st
     return fail(Errc::kInvalidInput,
                 "discovery server " + quote(address) + ": " + resolved.error().message);
   }
-  ertps::Locator_t at;
-  ertps::IPLocator::setIPv4(at, *resolved);
+  ertps::Locator_t at = *resolved;
   at.port = parsed->port;
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   // The period of calls to a server that has not answered yet.

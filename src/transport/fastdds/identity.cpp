@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <random>
-#include <sstream>
 #include <string>
 #include <unistd.h>
 
@@ -37,6 +36,20 @@ ertps::GuidPrefix_t new_prefix() {
   return prefix;
 }
 
+// Fast DDS reads each number with the locale of the program, in which the points between them may
+// separate thousands. A tab ends a number in any locale.
+template <std::size_t kSize>
+std::string text_of(const ertps::octet (&bytes)[kSize]) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const ertps::octet byte : bytes) {
+    if (!text.empty()) text += "\t.";
+    text += kDigits[byte >> 4U];
+    text += kDigits[byte & 15U];
+  }
+  return text;
+}
+
 }  // namespace
 
 void be_a_process_of_its_own(edds::DomainParticipantQos& qos) {
@@ -44,9 +57,9 @@ void be_a_process_of_its_own(edds::DomainParticipantQos& qos) {
 }
 
 void be_a_writer_of_its_own(edds::DataWriterQos& qos) {
-  std::ostringstream guid;
-  guid << ertps::GUID_t(new_prefix(), 1U);
-  qos.properties().properties().emplace_back("dds.persistence.guid", guid.str());
+  const ertps::GUID_t guid(new_prefix(), 1U);
+  const std::string text = text_of(guid.guidPrefix.value) + "\t|" + text_of(guid.entityId.value);
+  qos.properties().properties().emplace_back("dds.persistence.guid", text);
 }
 
 }  // namespace tfdude::fastdds
