@@ -10,6 +10,7 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "support/captured_log.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/process.hpp"
@@ -76,6 +77,35 @@ TEST_CASE("bounds: a flush names the daemon that hangs and has not acknowledged"
   CHECK(later.error().code == Errc::kUnreachable);
   d.arms->signal(SIGCONT);
   CHECK(testing::eventually([&] { return client.flush(100ms).has_value(); }));
+}
+
+TEST_CASE("bounds: neither a flush nor the end of a client waits for a process that was killed") {
+  ThesisDaemons d;
+  const testing::CapturedLog log;
+  std::optional<Client> client = Client::open(d.domain.options()).value();
+  const std::vector<EdgeUpdate> edge{{"hand_left", testing::along_x(1)}};
+  const auto publish = [&] { return client->publish(edge).has_value(); };
+  REQUIRE(testing::eventually(publish));
+  REQUIRE(client->flush(20'000ms));
+  const bool killed = GENERATE(true, false);
+  d.arms->signal(killed ? SIGKILL : SIGTERM);
+  // The last ones are sent to nobody.
+  REQUIRE(testing::eventually([&] { return !publish(); }));
+  d.arms.reset();
+  d.arms.emplace(d.domain.serve(testing::kArmsFile));
+  REQUIRE(testing::eventually(publish));
+  const auto restarted = Clock::now();
+  CHECK(client->flush(20'000ms));
+  // DDS keeps the killed process for 30 s.
+  CHECK(Clock::now() - restarted < 10s);
+  REQUIRE(client->publish({{"hand_left", testing::along_x(2)}}));
+  const auto again = Clock::now();
+  CHECK(client->flush(20'000ms));
+  CHECK(Clock::now() - again < 5s);
+  const auto end = Clock::now();
+  client.reset();
+  CHECK(Clock::now() - end < 5s);
+  CHECK(log.count("leaving") == 0);
 }
 
 TEST_CASE("bounds: no flush succeeds while another one still waits for an acknowledgement") {

@@ -33,14 +33,16 @@ struct DataPorts {
 struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
                   bool of_client, DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
-                  std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs)
+                  std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs,
+                  std::shared_ptr<Acknowledgements> acks)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         client(of_client),
         data_ports(ports_of_data),
         discovering(std::move(one_by_one)),
         gate(std::move(inward)),
-        life_signs(std::move(signs)) {}
+        life_signs(std::move(signs)),
+        acknowledgements(std::move(acks)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
@@ -59,6 +61,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<std::mutex> discovering;  // held while a message of discovery is handled, or null
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
+  std::shared_ptr<Acknowledgements> acknowledgements;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -108,6 +111,7 @@ class GatedTransport final : public SendFilter {
     if (!pass) return;
     const auto now = LifeSigns::Clock::now();
     descriptor_.life_signs->heard(bytes, size, now);
+    descriptor_.acknowledgements->heard(bytes, size);
     FairShare::begin(now);
     SendFilter::receive(next, bytes, size, local, remote);
     FairShare::end(FairShare::Clock::now());
@@ -227,7 +231,7 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
     transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
-                                                  gate_, life_signs_);
+                                                  gate_, life_signs_, acknowledgements_);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/life_signs.hpp"
@@ -35,9 +36,13 @@ namespace tfdude::fastdds {
 class DiscoveryGate {
  public:
   /// @param gate  all datagrams received over UDP pass it
-  /// @param life_signs  is told of each of them
-  DiscoveryGate(std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs)
-      : gate_(std::move(gate)), life_signs_(std::move(life_signs)) {}
+  /// @param life_signs, acknowledgements  are told of each of them
+  DiscoveryGate(
+      std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
+      std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>())
+      : gate_(std::move(gate)),
+        life_signs_(std::move(life_signs)),
+        acknowledgements_(std::move(acknowledgements)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -57,6 +62,7 @@ class DiscoveryGate {
  private:
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
+  const std::shared_ptr<Acknowledgements> acknowledgements_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

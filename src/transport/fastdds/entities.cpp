@@ -1,11 +1,13 @@
 #include "transport/fastdds/entities.hpp"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "transport/fastdds/peers.hpp"
 
 namespace tfdude::fastdds {
 
@@ -80,30 +82,53 @@ bool Writer::write(void* sample) {
   ertps::WriteParams params;
   params.source_timestamp(stamp);
   if (!fastdds::write(*writer_, sample, params)) return false;
+  last_ = params.sample_identity().sequence_number().to64long();
   ++written_;
   return true;
 }
 
-bool Writer::flush(Deadline deadline) {
-  // What is written during the wait is left to the next flush.
-  const std::uint64_t written = written_;
+bool Writer::flush(const Mark& mark, Deadline deadline,
+                   const std::function<bool(const PeerId&)>& gone,
+                   Acknowledgements* acknowledgements) {
   std::uint64_t before = acknowledged_;
-  if (before >= written) return true;
-  const bool anybody = wait_until_matched(Deadline());
+  if (before >= mark.written) return true;
+  std::vector<PeerId> readers;
+  {
+    const Lock lock(mutex_);
+    readers.assign(reader_peers_.begin(), reader_peers_.end());
+  }
+  const std::size_t matched = readers.size();
+  if (gone) readers.erase(std::remove_if(readers.begin(), readers.end(), gone), readers.end());
+  const bool all = readers.size() == matched;
+  // Nobody is left who could acknowledge it.
+  const bool acknowledged =
+      readers.empty() ||
+      (all ? await_all(deadline) : await_some(mark, deadline, readers, *acknowledgements));
+  if (!acknowledged) return false;
+  // Another flush may have waited for more.
+  while (before < mark.written && !acknowledged_.compare_exchange_weak(before, mark.written)) {
+  }
+  return true;
+}
+
+bool Writer::await_all(Deadline deadline) {
   // At most the longest time that DDS can represent.
   const Deadline now = Deadline::clock::now();
   const auto left =
       std::min(deadline, now + std::chrono::hours(24 * 365)) - std::min(now, deadline);
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
   const auto rest = std::chrono::nanoseconds(left - seconds).count();
-  const bool acknowledged =
-      anybody && ok(writer_->wait_for_acknowledgments({static_cast<std::int32_t>(seconds.count()),
-                                                       static_cast<std::uint32_t>(rest)}));
-  if (!acknowledged) return false;
-  // Another flush may have waited for more.
-  while (before < written && !acknowledged_.compare_exchange_weak(before, written)) {
-  }
-  return true;
+  return ok(writer_->wait_for_acknowledgments(
+      {static_cast<std::int32_t>(seconds.count()), static_cast<std::uint32_t>(rest)}));
+}
+
+bool Writer::await_some(const Mark& mark, Deadline deadline, const std::vector<PeerId>& readers,
+                        Acknowledgements& acknowledgements) const {
+  Acknowledgements::WriterId id{};
+  std::copy_n(writer_->guid().entityId.value, id.size(), id.begin());
+  return std::all_of(readers.begin(), readers.end(), [&](const PeerId& reader) {
+    return acknowledgements.wait_until(reader, id, mark.last, deadline);
+  });
 }
 
 std::string Writer::mismatch() const {
@@ -124,6 +149,10 @@ void Writer::on_publication_matched(edds::DataWriter*,
   bool one_more = false;
   {
     const Lock lock(mutex_);
+    const PeerId peer = peer_of(ertps::iHandle2GUID(status.last_subscription_handle).guidPrefix);
+    if (status.current_count_change > 0) reader_peers_.insert(peer);
+    const auto left = reader_peers_.find(peer);
+    if (status.current_count_change < 0 && left != reader_peers_.end()) reader_peers_.erase(left);
     one_more = status.current_count > readers_;
     if (readers_ == 0) matched_at_ = Deadline::clock::now();
     if (status.current_count == 0) replies_arrive_ = false;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "base/mutex.hpp"
+#include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/creation.hpp"
 #include "transport/fastdds/endpoint_numbers.hpp"
@@ -90,9 +92,23 @@ class Writer final : public edds::DataWriterListener {
     return replies_arrive_.load(std::memory_order_relaxed);
   }
 
-  /// For a reliable writer: waits until everything written is acknowledged. False at the deadline,
-  /// or if no reader is left that could acknowledge.
-  [[nodiscard]] bool flush(Deadline deadline);
+  /// For a reliable writer: waits until all readers have acknowledged everything written. False at
+  /// the deadline.
+  [[nodiscard]] bool flush(Deadline deadline) { return flush(mark(), deadline, {}, nullptr); }
+
+  /// What was written so far.
+  struct Mark {
+    std::uint64_t written = 0;  // number of samples
+    std::uint64_t last = 0;     // the number that DDS gave to the last of them
+  };
+  [[nodiscard]] Mark mark() const { return {written_, last_}; }
+
+  /// The same for what was written until then, without waiting for some readers.
+  /// @param gone  whether a participant will never acknowledge anything
+  /// @param acknowledgements  is asked if there are such readers
+  [[nodiscard]] bool flush(const Mark& mark, Deadline deadline,
+                           const std::function<bool(const PeerId&)>& gone,
+                           Acknowledgements* acknowledgements);
 
   /// Records that this participant depends on the readers now.
   void use(Deadline now) { last_use_.store(now, std::memory_order_relaxed); }
@@ -107,6 +123,11 @@ class Writer final : public edds::DataWriterListener {
                                    const edds::OfferedIncompatibleQosStatus& status) override;
 
  private:
+  [[nodiscard]] bool await_all(Deadline deadline);
+  [[nodiscard]] bool await_some(const Mark& mark, Deadline deadline,
+                                const std::vector<PeerId>& readers,
+                                Acknowledgements& acknowledgements) const;
+
   const Context context_;
   const std::function<void()> on_reader_;
   edds::Publisher* publisher_ = nullptr;
@@ -116,8 +137,10 @@ class Writer final : public edds::DataWriterListener {
   mutable Mutex mutex_;
   std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
+  std::multiset<PeerId> reader_peers_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<int> readers_{0};                 // changed under mutex_
   std::atomic<std::uint64_t> written_{0};       // number of samples, counted once written
+  std::atomic<std::uint64_t> last_{0};          // as in Mark
   std::atomic<std::uint64_t> acknowledged_{0};  // at least so many of them
   std::atomic<Deadline> last_use_{Deadline::min()};
   std::atomic<Deadline> matched_at_{Deadline::min()};

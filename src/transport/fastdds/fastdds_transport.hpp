@@ -10,6 +10,7 @@
 
 #include "base/mutex.hpp"
 #include "transport/fastdds/access.hpp"
+#include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/admission.hpp"
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/clock_channel.hpp"
@@ -136,7 +137,8 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<FastDdsCounters> counters_;
   TransportHandler* handler_ = nullptr;
   const std::shared_ptr<LifeSigns> life_signs_ = std::make_shared<LifeSigns>();
-  DiscoveryGate discovery_gate_{gate_, life_signs_};
+  const std::shared_ptr<Acknowledgements> acknowledgements_ = std::make_shared<Acknowledgements>();
+  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);

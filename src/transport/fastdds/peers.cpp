@@ -166,6 +166,18 @@ bool Peers::silent(const std::string& partition) const {
   return silent;
 }
 
+bool Peers::replaced(const PeerId& peer) const {
+  const Lock lock(mutex_);
+  const auto known = servers_.find(peer);
+  if (known == servers_.end() || !known->second.silent) return false;
+  const Presence* old = known->second.said();
+  return old != nullptr && std::any_of(servers_.begin(), servers_.end(), [old](const auto& one) {
+           const auto& presence = one.second.presence;
+           return presence && !one.second.silent && presence->serving &&
+                  presence->partition == old->partition && presence->incarnation > old->incarnation;
+         });
+}
+
 bool Peers::awaits_presence() const {
   const Lock lock(mutex_);
   return !all_present();

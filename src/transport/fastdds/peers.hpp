@@ -101,6 +101,9 @@ class Peers {
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
+  /// Whether a server is silent, and a later process serves its partition.
+  [[nodiscard]] bool replaced(const PeerId& peer) const;
+
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
   /// announced what they serve, and none hears more others than this participant knows.
   [[nodiscard]] bool discovered() const;

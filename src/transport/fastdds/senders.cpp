@@ -121,14 +121,29 @@ Result<void> Senders::flush(Deadline deadline) {
   for (auto& stream : joints_.all()) streams.push_back(std::move(stream));
   Result<void> outcome;
   for (const auto& [partition, stream] : streams) {
-    // A silent peer is not waited for; what it has acknowledged before still counts.
-    const bool silent = parts_.peers.silent(partition);
-    if (stream->flush(silent ? Deadline() : deadline) || !outcome) continue;
-    outcome =
-        fail(silent ? Errc::kUnreachable : Errc::kTimeout,
-             "partition " + quote(partition) + " has not acknowledged all that was streamed to it");
+    if (auto flushed = flush(*stream, partition, deadline); !flushed && outcome) {
+      outcome = std::move(flushed);
+    }
   }
   return outcome;
+}
+
+// Looks again and again who is there, because an owner may be lost, or return, meanwhile.
+Result<void> Senders::flush(Writer& stream, const std::string& partition, Deadline deadline) {
+  const Writer::Mark mark = stream.mark();  // what is written meanwhile is left to the next flush
+  const auto gone = [this](const PeerId& peer) { return parts_.peers.replaced(peer); };
+  while (true) {
+    // A silent peer is not waited for; what it has acknowledged before still counts.
+    const bool silent = parts_.peers.silent(partition);
+    const auto now = Peers::Clock::now();
+    const Deadline step = silent ? Deadline() : std::min(deadline, now + kWaitStep);
+    if (stream.flush(mark, step, gone, &parts_.acknowledgements)) return {};
+    if (silent || now >= deadline) {
+      return fail(
+          silent ? Errc::kUnreachable : Errc::kTimeout,
+          "partition " + quote(partition) + " has not acknowledged all that was streamed to it");
+    }
+  }
 }
 
 std::set<std::string> Senders::used_owners() const {

@@ -8,6 +8,7 @@
 #include "tfdude/base/result.hpp"
 
 #include "transport/fastdds/access.hpp"
+#include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/entities.hpp"
 #include "transport/fastdds/peers.hpp"
@@ -31,6 +32,7 @@ class Senders {
     Attention& attention;
     const Access& access;
     const ReplyPaths& reply_paths;
+    Acknowledgements& acknowledgements;
     std::uint32_t domain;  // for messages
   };
 
@@ -64,6 +66,7 @@ class Senders {
                                   Deadline deadline);
   [[nodiscard]] Result<void> await_match(Writer& writer, const std::string& partition,
                                          Deadline deadline);
+  [[nodiscard]] Result<void> flush(Writer& stream, const std::string& partition, Deadline deadline);
   [[nodiscard]] bool await_reply_path(Writer& writer, const std::string& partition,
                                       Deadline deadline);
   [[nodiscard]] Error undiscovered(const std::string& partition) const;

@@ -100,6 +100,33 @@ TEST_CASE("a peer of another major version is reported and otherwise ignored") {
   CHECK(told == 0);
 }
 
+TEST_CASE("a silent peer is replaced once a later process serves its partition") {
+  Observer one;
+  const auto replaced = [&](unsigned char number) {
+    return one.peers.replaced(peer_of(prefix_of(number)));
+  };
+  one.meet(1, "arms");
+  one.meet(2, "head");
+  CHECK_FALSE(replaced(1));
+  one.look(std::chrono::seconds(3));
+  REQUIRE(one.peers.silent("arms"));
+  CHECK_FALSE(replaced(1));
+  Presence later = presence_of("arms");
+  later.incarnation = 2;
+  later.serving = false;  // claims the name
+  one.peers.present(prefix_of(3), later, 0);
+  CHECK_FALSE(replaced(1));
+  later.serving = true;
+  one.peers.present(prefix_of(3), later, 0);
+  CHECK(replaced(1));
+  CHECK_FALSE(replaced(2));  // of another partition
+  CHECK_FALSE(replaced(3));
+  CHECK_FALSE(replaced(4));  // unknown
+  // It was only paused.
+  one.peers.present(prefix_of(1), presence_of("arms"), 0);
+  CHECK_FALSE(replaced(1));
+}
+
 TEST_CASE("discovery is complete when all peers know as many participants") {
   Observer one;
   SECTION("a peer that knows no other") {
