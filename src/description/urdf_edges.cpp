@@ -247,6 +247,7 @@ Result<void> EdgeReader::couple(Index i) {
   mimic.joint = other.name;
   other.coupled = true;
   joint->coupled = true;
+  mimic.of_continuous = other.type == JointType::kContinuous;
   joint->position = mimic.position(other.position);
   joint->variance = mimic.variance(other.variance);
   joint->sample_variance = mimic.variance(other.sample_variance);

@@ -12,8 +12,9 @@ Eigen::Quaterniond normalized(const Eigen::Quaterniond& q) {
 
 }  // namespace
 
-PreparedJoint::PreparedJoint(const Joint& joint)
+PreparedJoint::PreparedJoint(const Joint& joint, double period)
     : joint_(joint),
+      period_(period),
       exact_origin_(joint.X_PJ.covariance == StatedCovariance::exact()),
       unit_(joint_transform({Transform::exact({}), joint.S}, 0, 1)
                 .covariance.of_specified()

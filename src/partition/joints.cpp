@@ -158,7 +158,9 @@ Result<std::size_t> Joints::apply(const JointUpdate& update) {
   for (const Step& step : steps_) {
     Mover& mover = movers_[step.mover];
     CorrelatedUpdate one{mover.handle, value_at(mover.spec, step.position, step.variance)};
-    one.state = {&mover.spec.joint, {step.position, own_variance(mover.spec, step.variance)}};
+    one.state = {&mover.spec.joint,
+                 {step.position, own_variance(mover.spec, step.variance)},
+                 period_of(mover.spec)};
     const bool resay = mover.spec.coupled && mover.said_variance != step.variance;
     if (resay && is_newer(mover, update.stamp)) {
       mover.said = shared_error(mover.spec, step.variance);

@@ -13,6 +13,16 @@ const PreparedJoint* joint_of(const Sample& before, const Sample& after) {
   return before.shared == after.shared ? after.joint() : nullptr;
 }
 
+// Whether a joint that starts beside a position, by whole periods, has another pose there: one that
+// mimics a continuous joint, unless its multiplier is a whole number.
+bool jumps(const PreparedJoint& joint, double beside) {
+  constexpr double kTurn = 2 * 3.14159265358979323846;
+  constexpr double kRounding = 1e-6;
+  if (std::abs(beside) <= kRounding) return false;
+  return !joint.joint().S.head<3>().isZero(0) ||
+         std::abs(std::remainder(beside, kTurn)) > kRounding;
+}
+
 }  // namespace
 
 Transform Sample::value() const {
@@ -36,7 +46,7 @@ bool Sample::complete() const {
 
 void interpolate(const Sample& before, const Sample& after, double s, Transform& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    joint->compute(interpolate(before.at(), after.at(), s), X);
+    joint->compute(interpolate(before.at(), after.at(), s, joint->period()), X);
   } else {
     interpolate(before.value(), after.value(), s, X);
   }
@@ -44,7 +54,7 @@ void interpolate(const Sample& before, const Sample& after, double s, Transform&
 
 void interpolate(const Sample& before, const Sample& after, double s, Pose& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    X = joint->pose(interpolate(before.at(), after.at(), s).position);
+    X = joint->pose(interpolate(before.at(), after.at(), s, joint->period()).position);
   } else {
     interpolate(before.value_pose(), after.value_pose(), s, X);
   }
@@ -53,7 +63,7 @@ void interpolate(const Sample& before, const Sample& after, double s, Pose& X) {
 void extrapolate(const Sample& before, const Sample& after, const Transform& X1, double s,
                  Transform& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    joint->compute(extrapolate(before.at(), after.at(), s), X);
+    joint->compute(extrapolate(before.at(), after.at(), s, joint->period()), X);
   } else {
     X = extrapolate(before.value(), X1, s);
   }
@@ -61,7 +71,7 @@ void extrapolate(const Sample& before, const Sample& after, const Transform& X1,
 
 void extrapolate(const Sample& before, const Sample& after, const Pose& X1, double s, Pose& X) {
   if (const PreparedJoint* joint = joint_of(before, after)) {
-    X = joint->pose(extrapolate(before.at(), after.at(), s).position);
+    X = joint->pose(extrapolate(before.at(), after.at(), s, joint->period()).position);
   } else {
     X = extrapolate(before.value_pose(), X1, s);
   }
@@ -73,11 +83,14 @@ std::vector<std::int64_t> instants_between(const Sample& before, const Sample& a
   std::vector<std::int64_t> instants;
   const PreparedJoint* joint = joint_of(before, after);
   if (joint == nullptr) return instants;
-  const double turn =
-      std::abs(after.at().position - before.at().position) * joint->joint().S.tail<3>().norm();
+  const double start = start_of(before.at().position, after.at().position, joint->period());
+  const std::int64_t span = after.stamp - before.stamp;
+  if (span > 1 && jumps(*joint, start - before.at().position)) {
+    instants.push_back(before.stamp + 1);
+  }
+  const double turn = std::abs(after.at().position - start) * joint->joint().S.tail<3>().norm();
   if (turn <= kFar) return instants;
   const auto parts = static_cast<std::int64_t>(std::min(std::ceil(turn / kFar), kMost));
-  const std::int64_t span = after.stamp - before.stamp;
   for (std::int64_t i = 1; i < parts && span >= parts; ++i) {
     instants.push_back(before.stamp + span / parts * i);
   }

@@ -99,7 +99,8 @@ void extrapolate(const Sample& before, const Sample& after, const Transform& X1,
 void extrapolate(const Sample& before, const Sample& after, const Pose& X1, double s, Pose& X);
 
 /// Instants between two samples, so close that interpolate() of the values at consecutive ones is
-/// the value between them. None, unless both are positions of a joint that turns far.
+/// the value between them. None, unless both are positions of a joint that turns far, or jumps
+/// after the first.
 [[nodiscard]] std::vector<std::int64_t> instants_between(const Sample& before, const Sample& after);
 
 /// Consecutive samples of one history.

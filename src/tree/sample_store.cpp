@@ -31,11 +31,12 @@ bool is_shared(const GivenValue& value, const SharedPart& part) {
     return same(value.X_PC.covariance, static_cast<const SharedCovariance&>(part).covariance);
   }
   const Joint& joint = *value.state->joint;
-  const Joint& of_part = static_cast<const SharedJoint&>(part).joint.joint();
+  const PreparedJoint& prepared = static_cast<const SharedJoint&>(part).joint;
+  const Joint& of_part = prepared.joint();
   const Pose& X = joint.X_PJ.pose;
   const Pose& Y = of_part.X_PJ.pose;
-  return joint.S == of_part.S && X.translation() == Y.translation() &&
-         X.rotation().coeffs() == Y.rotation().coeffs() &&
+  return value.state->period == prepared.period() && joint.S == of_part.S &&
+         X.translation() == Y.translation() && X.rotation().coeffs() == Y.rotation().coeffs() &&
          same(joint.X_PJ.covariance, of_part.X_PJ.covariance);
 }
 
@@ -64,7 +65,7 @@ const SharedPart* SampleStore::fresh_part(const GivenValue& value) {
   }
   SharedJoint* part = joints_.take();
   part->is_joint = true;
-  part->joint = PreparedJoint(*value.state->joint);
+  part->joint = PreparedJoint(*value.state->joint, value.state->period);
   bytes_ += sizeof(*part);
   return part;
 }

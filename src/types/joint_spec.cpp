@@ -8,6 +8,11 @@
 #include "math/finite.hpp"
 
 namespace tfdude {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+}  // namespace
 
 const char* to_string(JointType type) {
   switch (type) {
@@ -65,13 +70,21 @@ Transform value_at(const JointSpec& joint, double position, std::optional<double
   return joint_transform(joint.joint, position, own_variance(joint, variance));
 }
 
+double period_of(const JointSpec& joint) {
+  if (joint.mimic) {
+    return joint.mimic->of_continuous ? 2 * kPi * std::abs(joint.mimic->multiplier) : 0;
+  }
+  // A screw is elsewhere after a turn.
+  const bool turns = joint.joint.S.head<3>().isZero(0);
+  return joint.type == JointType::kContinuous && turns ? 2 * kPi : 0;
+}
+
 double rest_position(const std::optional<JointLimits>& limits) {
   return limits ? std::clamp(0.0, limits->lower, limits->upper) : 0.0;
 }
 
 std::optional<double> unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
                                           double position) {
-  constexpr double kPi = 3.14159265358979323846;
   if (!limits && type == JointType::kPrismatic) return std::nullopt;
   if (!limits) return kPi * kPi / 3.0;
   const double range = limits->upper - limits->lower;

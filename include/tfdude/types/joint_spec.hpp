@@ -31,6 +31,8 @@ struct Mimic {
   std::string joint;
   double multiplier = 1;
   double offset = 0;
+  /// The other is continuous, so this one takes the shorter way, too; see period_of().
+  bool of_continuous = false;
 
   /// Position and variance of the mimic joint.
   [[nodiscard]] double position(double of_other) const { return multiplier * of_other + offset; }
@@ -74,6 +76,12 @@ struct JointInfo {
 [[nodiscard]] inline const std::string& leader_of(const JointSpec& joint) {
   return joint.mimic ? joint.mimic->joint : joint.name;
 }
+
+/// How far apart two positions are that may be the same pose, so that the joint goes the shorter
+/// way between samples [rad or m]: a turn for a continuous joint, whose drivers report angles of
+/// one turn, and for a joint that mimics one as much as that turn moves it; 0 for others, whose
+/// positions all differ.
+[[nodiscard]] TFDUDE_EXPORT double period_of(const JointSpec& joint);
 
 /// A joint's position and its variance.
 struct JointValue {

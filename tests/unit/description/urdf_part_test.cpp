@@ -1,3 +1,4 @@
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,26 @@ TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   CHECK(alone[0].joint->mimic->joint == "p_f1");
   CHECK(alone[0].joint->position == third.position);
   CHECK(frames_of(hand(), with_links({"l1"}))[0].joint->coupled);
+}
+
+TEST_CASE("urdf: a joint that mimics a continuous one goes the shorter way as it does") {
+  const std::string text =
+      robot(link("a") + link("b") + link("c") + link("d") + link("e") +
+            joint("j", "continuous", "a", "b") +
+            joint("k", "prismatic", "b", "c",
+                  "<mimic joint=\"j\" multiplier=\"-0.5\"/><limit lower=\"-9\" upper=\"9\"/>") +
+            joint("l", "continuous", "c", "d", "<mimic joint=\"k\" multiplier=\"3\"/>") +
+            joint("m", "continuous", "d", "e", "<mimic joint=\"n\"/>") + link("f") +
+            joint("n", "revolute", "e", "f", "<limit lower=\"-9\" upper=\"9\"/>"));
+  const auto period = [&](const char* frame) {
+    return period_of(*frames_of(text, with_links({frame}))[0].joint);
+  };
+  const double turn = 2 * std::acos(-1.0);
+  CHECK(period("b..b") == Approx(turn));
+  CHECK(period("c..c") == Approx(0.5 * turn));
+  CHECK(period("d..d") == Approx(1.5 * turn));
+  CHECK(period("e..e") == 0);
+  CHECK(period("f") == 0);
 }
 
 TEST_CASE("urdf: an invalid mimic joint is rejected") {

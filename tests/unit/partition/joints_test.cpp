@@ -176,6 +176,32 @@ TEST_CASE("a position outside the limits is applied and counted unless the joint
   REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 2, 0}}, {}}));
 }
 
+TEST_CASE("a continuous joint, and one that mimics it, take the shorter way between positions") {
+  Arm arm;
+  auto frames = arm.frames();
+  frames[2].joint->type = JointType::kContinuous;
+  frames[2].joint->limits.reset();
+  frames[3].joint->mimic->of_continuous = true;
+  frames[3].joint->limits.reset();
+  REQUIRE(arm.partition.load(frames, kNow));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 3.1, 0}, {"shoulder", 1.9, 0}}, at(0)}));
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", -3.1, 0}, {"shoulder", -0.9, 0}}, at(100)}));
+  const double pi = std::acos(-1.0);
+  const auto yaw_of = [&](const char* parent, const char* frame, int milliseconds) {
+    Query query;
+    query.at = at(milliseconds);
+    return std::remainder(testing::yaw(arm.forest.lookup(parent, frame, query)), 2 * pi);
+  };
+  CHECK(std::abs(yaw_of("upper", "fore", 50)) == Approx(pi));
+  CHECK(yaw_of("upper", "fore", 75) == Approx(-3.1 - 0.25 * (2 * pi - 6.2)));
+  // -0.5 · 3.1 + 0.125, then -0.5 · -3.1 + 0.125.
+  CHECK(yaw_of("fore", "hand", 0) == Approx(-1.425));
+  CHECK(yaw_of("fore", "hand", 50) == Approx(1.675 + 0.25 * (2 * pi - 6.2)));
+  CHECK(yaw_of("fore", "hand", 100) == Approx(1.675));
+  // A revolute one does not.
+  CHECK(yaw_of("base", "upper", 50) == Approx(0.5));
+}
+
 TEST_CASE("invalid positions are rejected by name and change nothing") {
   Arm arm;
   arm.load();

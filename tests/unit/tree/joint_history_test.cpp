@@ -39,8 +39,10 @@ struct Turning {
     arm = *forest.find("arm");
   }
   CorrelatedUpdate update(double position, double variance) const {
-    return {
-        arm, joint_transform(joint, position, variance), nullptr, {&joint, {position, variance}}};
+    return {arm,
+            joint_transform(joint, position, variance),
+            nullptr,
+            {&joint, {position, variance}, period}};
   }
   void turn(double position, std::int64_t milliseconds, double variance = 0.01) {
     REQUIRE(forest.update_correlated({update(position, variance)}, at(milliseconds)));
@@ -55,9 +57,12 @@ struct Turning {
   }
 
   Joint joint;
+  double period = 0;
   Forest forest;
   Handle arm;
 };
+
+constexpr double kTurn = 2 * 3.14159265358979323846;
 
 }  // namespace
 
@@ -72,6 +77,50 @@ TEST_CASE("between positions more than half a turn apart the joint moves the lon
   CHECK(yaw(robot.lookup(query(1500))) == Approx(0).margin(1e-12));
   robot.turn(100, 3000, 0.03);
   CHECK(robot.difference(query(2750), 2 + 0.75 * 98, 0.03) == "");
+}
+
+TEST_CASE("a joint with a period takes the shorter way between positions and beyond them") {
+  Turning wheel;
+  wheel.period = kTurn;
+  wheel.turn(3.1, 10'000, 0.01);
+  wheel.turn(-3.1, 10'100, 0.03);
+  const double step = kTurn - 6.2;
+  CHECK(std::abs(yaw(wheel.lookup(query(10'050)))) == Approx(kTurn / 2));
+  CHECK(wheel.difference(query(10'025), 3.1 + 0.25 * step, 0.015) == "");
+  CHECK(wheel.difference(query(10'100), -3.1, 0.03) == "");
+  const double beyond = yaw(wheel.lookup(query(10'150, 1s)));
+  CHECK(std::remainder(beyond, kTurn) == Approx(-3.1 + 0.5 * step));
+  // Back again, and over several turns.
+  wheel.turn(3.1, 10'200, 0.03);
+  CHECK(wheel.difference(query(10'150), -3.1 - 0.5 * step, 0.03) == "");
+  wheel.turn(3.1 - 3 * kTurn + 1, 10'300, 0.03);
+  CHECK(wheel.difference(query(10'250), 3.6, 0.03) == "");
+  // Half a turn and less is as before.
+  wheel.turn(0, 10'400);
+  wheel.turn(3, 10'500);
+  CHECK(wheel.difference(query(10'450), 1.5, 0.01) == "");
+}
+
+TEST_CASE("a joint whose period is no whole turn jumps after a sample, and goes on from the next") {
+  Turning mimic;
+  Turning watcher;
+  mimic.period = 0.5 * kTurn;  // half of what a continuous joint turns
+  std::vector<EdgeCursor> cursors{{"arm", "base"}};
+  const double step = 0.5 * (kTurn - 6.2);
+  mimic.turn(1.55, 1000);
+  watcher.forest.take({watcher.arm}, mimic.forest.values_since(cursors, {}).values);
+  mimic.turn(-1.55, 1100);
+  watcher.forest.take({watcher.arm}, mimic.forest.values_since(cursors, {}).values);
+  CHECK(mimic.difference(query(1000), 1.55, 0.01) == "");
+  CHECK(mimic.difference(query(1050), -1.55 - 0.5 * step, 0.01) == "");
+  CHECK(yaw(mimic.lookup(query(1110, 1s))) == Approx(-1.55 + 0.1 * step));
+  for (const int t : {1000, 1025, 1050, 1100, 1110}) {
+    const auto X = mimic.lookup(query(t, 1s));
+    const auto Y = watcher.lookup(query(t, 1s));
+    REQUIRE(X);
+    REQUIRE(Y);
+    CHECK(testing::pose_diff(Y->pose, X->pose, 1e-7) == "");
+  }
 }
 
 TEST_CASE("a pose without covariance is that of the position, too") {

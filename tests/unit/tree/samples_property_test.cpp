@@ -2,6 +2,7 @@
 // positions of joints, late and replaced samples, limits, and a watcher of all of it.
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -71,8 +72,12 @@ class Reference {
     const double s = static_cast<double>(t - a.stamp) / static_cast<double>(b.stamp - a.stamp);
     const bool joint = a.state.joint != nullptr && a.state.joint == b.state.joint;
     if (joint) {
+      const double period = a.state.period;
+      JointPosition start = a.state.at;
+      const double turns = std::round((b.state.at.position - start.position) / period);
+      if (period > 0) start.position += turns * period;
       const JointPosition q =
-          outside ? extrapolate(a.state.at, b.state.at, s) : interpolate(a.state.at, b.state.at, s);
+          outside ? extrapolate(start, b.state.at, s, 0) : interpolate(start, b.state.at, s, 0);
       return joint_value({a.state.joint, q});
     }
     return outside ? extrapolate(a.X, b.X, s) : interpolate(a.X, b.X, s);
@@ -114,6 +119,7 @@ class Edge {
     // A screw, whose error concerns all axes.
     joints_[0] = {{random.pose(), {}}, random.twist(1)};
     joints_[1] = prismatic_joint({random.pose(), {}}, random.direction());
+    for (double& period : periods_) period = random.index(2) == 0 ? 0 : random.uniform(1, 9);
   }
 
   void step() {
@@ -197,7 +203,7 @@ class Edge {
     if (mode_ == 2) return pose(stamp);
     const double reach = random_.index(5) == 0 ? 9.0 : 0.5;
     position_ += random_.uniform(-reach, reach);
-    const JointState state{&joints_[mode_], {position_, random_.uniform(0, 0.1)}};
+    const JointState state{&joints_[mode_], {position_, random_.uniform(0, 0.1)}, periods_[mode_]};
     return {stamp, joint_value(state), state};
   }
   void revise(const Full& sample) {
@@ -212,6 +218,7 @@ class Edge {
   Handle edge_;
   std::vector<EdgeCursor> cursors_{{"edge", "base"}};
   Joint joints_[2];
+  double periods_[2] = {};
   std::size_t mode_ = 0;
   double position_ = 0;
   Pose X_;
