@@ -8,7 +8,6 @@
 #include "tfdude/base/number.hpp"
 
 namespace tfdude {
-
 const char* to_string(ClockKind kind) {
   return kind == ClockKind::kExternal ? "external" : "system";
 }
@@ -30,6 +29,23 @@ std::string to_string(Time time) {
   std::snprintf(fraction.data(), fraction.size(), ".%03d UTC",
                 static_cast<int>((milliseconds - seconds).count()));
   return std::string(date.data(), length) + fraction.data();
+}
+
+std::string readable(std::chrono::nanoseconds duration) {
+  const double seconds = std::chrono::duration<double>(duration).count();
+  const double size = std::abs(seconds);
+  if (size < 1) return in_milliseconds(duration);
+  if (size < 10) return fixed_text(seconds, 3) + " s";
+  if (size < 120) return fixed_text(seconds, 1) + " s";
+  if (size < 7200) return fixed_text(seconds / 60, 1) + " min";
+  if (size < 172'800) return fixed_text(seconds / 3600, 1) + " h";
+  return fixed_text(seconds / 86'400, 1) + " days";
+}
+
+std::string readable(Time stamp) {
+  constexpr std::int64_t kYear2000 = 946'684'800'000'000'000;
+  if (nanoseconds(stamp) >= kYear2000) return to_string(stamp);
+  return fixed_text(static_cast<double>(nanoseconds(stamp)) * 1e-9, 3) + " s";
 }
 
 }  // namespace tfdude

@@ -35,4 +35,12 @@ enum class ClockKind : std::uint8_t {
 /// For people: "2026-11-21 14:03:59.125 UTC".
 [[nodiscard]] TFDUDE_EXPORT std::string to_string(Time time);
 
+/// For people, in the unit that fits: "12.300 ms", "4.500 s", "15.2 s", "3.5 min", "7.0 h", "2.5
+/// days".
+[[nodiscard]] TFDUDE_EXPORT std::string readable(std::chrono::nanoseconds duration);
+
+/// A stamp for people: as to_string(), but "15.200 s" if it is of a clock that started at 0, as
+/// that of a simulation.
+[[nodiscard]] TFDUDE_EXPORT std::string readable(Time stamp);
+
 }  // namespace tfdude
