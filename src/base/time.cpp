@@ -8,6 +8,7 @@
 #include "tfdude/base/number.hpp"
 
 namespace tfdude {
+
 const char* to_string(ClockKind kind) {
   return kind == ClockKind::kExternal ? "external" : "system";
 }

@@ -138,7 +138,13 @@ bool Joints::starts_again(const Mover& mover, Time stamp) const {
 void Joints::take(const Step& step, std::optional<Time> stamp) {
   Mover& mover = movers_[step.mover];
   mover.outside += step.outside ? 1 : 0;
-  if (!is_newer(mover, stamp) && !starts_again(mover, *stamp)) return;
+  if (!is_newer(mover, stamp)) {
+    if (!starts_again(mover, *stamp)) return;
+    if (mover.spec.coupled && mover.said_variance != step.variance) {
+      mover.said = shared_error(mover.spec, step.variance);
+      (void)forest_.correlate(mover.frame, mover.said);
+    }
+  }
   mover.position = step.position;
   mover.variance = step.variance;
   if (mover.spec.coupled) mover.said_variance = step.variance;

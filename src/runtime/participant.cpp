@@ -107,7 +107,7 @@ Result<void> Participant::set_time(Time now, bool by_itself) {
   const auto before = structure_.clock.set(now);
   if (!before) return tl::unexpected(before.error());
   if (!*before) return {};
-  const std::size_t cleared = structure_.forest.clear_histories(now);
+  const std::size_t cleared = structure_.forest.clear_histories(now, *before);
   // The 1st, 2nd, 4th... only: two publishers of the time would fill the log.
   const std::uint64_t jumps = ++jumps_;
   if ((jumps & (jumps - 1)) == 0) {

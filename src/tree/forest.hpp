@@ -168,8 +168,11 @@ class Forest {
   /// @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<void> clear_history(std::string_view id);
   /// Likewise for all held edges with samples at this time or later, as one commit. Also reads the
-  /// clock again before the next stamp is judged. O(slots). @return how many
-  std::size_t clear_histories(Time from);
+  /// clock again before the next stamp is judged. O(slots).
+  /// @param jumped_from  where the clock has jumped back from: samples that were on their way then
+  ///   are rejected, until it is there again
+  /// @return how many
+  std::size_t clear_histories(Time from, std::optional<Time> jumped_from = std::nullopt);
 
   /// Limits the memory of the samples of all histories together. Once it is reached, the oldest
   /// samples are dropped, except the two newest of each edge.

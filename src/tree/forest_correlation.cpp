@@ -110,19 +110,19 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
   return there ? Result<void>() : check_sample(edge, at);
 }
 
-void Forest::Impl::replace_sample(const HeldVersion& newest, const Transform& X_PC,
+void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& value,
                                   std::int64_t stamp) {
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
-    push_value(newest.slot, {X_PC}, stamp);
+    push_value(newest.slot, value, stamp);
     return;
   }
   SampleHistory* superseded = newest.samples;
   const Sample* before = superseded->sample(place);
-  const Sample sample = sample_at(*superseded, place, {X_PC}, stamp);
+  const Sample sample = sample_at(*superseded, place, value, stamp);
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
-  HeldVersion& fresh = push_held(newest.slot, is_newest ? X_PC : newest.X_PC);
+  HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
@@ -154,7 +154,7 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
     const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
     if (newest.moving() && stamp) {
       const Transform X_PC = Impl::whole(edges[i].X_PC, edges[i].correlation);
-      impl_->replace_sample(newest, X_PC, nanoseconds(*stamp));
+      impl_->replace_sample(newest, {X_PC}, nanoseconds(*stamp));
       continue;
     }
     const Correlation said =

@@ -71,6 +71,9 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   newest.name->refused.end_row();
   const std::uint64_t place = newest.samples->place_of(stamp);
   const Sample* there = newest.samples->sample(place);
+  if (there->stamp == stamp && there->commit != frames_.commit_being_made()) {
+    return replace_sample(newest, value, stamp);
+  }
   const Sample sample = sample_at(*newest.samples, place, value, stamp);
   if (there->stamp == stamp) {
     // Twice in one update: the later one counts, and no reader has seen the earlier.
@@ -136,9 +139,10 @@ Result<void> Forest::clear_history(std::string_view id) {
   return {};
 }
 
-std::size_t Forest::clear_histories(Time from) {
+std::size_t Forest::clear_histories(Time from, std::optional<Time> jumped_from) {
   const Writing lock(impl_->mutex_);
   impl_->clock_.read_again();
+  if (jumped_from) impl_->clock_.jumped_from(nanoseconds(*jumped_from));
   std::size_t cleared = 0;
   for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
     if (!impl_->frames_.newest(slot).held()) continue;

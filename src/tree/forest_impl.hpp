@@ -80,7 +80,7 @@ class Forest::Impl {
   // History (forest_history.cpp).
 
   /// The stamp for an update of all these edges: the given one, or, if one is needed, the clock's,
-  /// later than all their samples.
+  /// or that of their newest sample if the clock is not there yet. That sample is then replaced.
   [[nodiscard]] Result<std::int64_t> stamp_for(const HeldVersion* const* edges, std::size_t count,
                                                const std::optional<Time>& given)
       TFDUDE_REQUIRES(mutex_);
@@ -151,7 +151,7 @@ class Forest::Impl {
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// Replaces the dynamic edge's sample with that stamp, if there is one.
-  void replace_sample(const HeldVersion& newest, const Transform& X_PC, std::int64_t stamp)
+  void replace_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
 
   Frames frames_;

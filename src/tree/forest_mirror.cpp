@@ -22,7 +22,7 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
       if (!replace || same(edge.samples->sample(place)->value(), X_PC)) return false;
-      replace_sample(edge, X_PC, stamp);
+      replace_sample(edge, {X_PC}, stamp);
       return true;
     }
     if (!check_sample(edge, stamp)) return false;

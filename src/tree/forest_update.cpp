@@ -65,24 +65,32 @@ Result<std::int64_t> Forest::Impl::stamp_for(const HeldVersion* const* edges, st
   }
   const auto now = clock_.now();
   if (!now) return no_time(*edges[0]);
-  // If the clock was set back, time advances as little as possible.
-  return newest == kAlways ? *now : std::max(*now, saturating_add(newest, 1));
+  // If the clock stands still or was set back, the newest samples are replaced: stamps that are
+  // made up must not tell a velocity.
+  return std::max(*now, newest);
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {
   const std::int64_t limit = timing_of(edge).max_ahead.count();
-  if (!clock_.is_there() || limit == std::chrono::nanoseconds::max().count()) return {};
+  const bool limited = limit != std::chrono::nanoseconds::max().count();
+  if (!clock_.is_there() || (!limited && !clock_.has_jumped())) return {};
   if (clock_.surely_admits(stamp, limit)) return {};
   const auto now = clock_.read();
   if (!now) return no_time(edge);
   const std::int64_t ahead = saturating_subtract(stamp, *now);
-  if (ahead <= limit) return {};
+  const bool of_before = clock_.is_of_before(stamp, *now);
+  if (ahead <= limit && !of_before) return {};
   edge.name->refused.more().ahead.fetch_add(1, std::memory_order_relaxed);
-  return fail(Errc::kInvalidInput,
-              "frame " + quote(edge.name->text) + ": the stamp, " + to_string(time_of(stamp)) +
-                  ", is " + in_milliseconds(std::chrono::nanoseconds(ahead)) +
-                  " ahead of the owner's clock, " + to_string(time_of(*now)) + ", more than the " +
-                  in_milliseconds(timing_of(edge).max_ahead) + " allowed");
+  const std::string what =
+      "frame " + quote(edge.name->text) + ": the stamp, " + readable(time_of(stamp)) + ", is ";
+  const std::string clock = "the owner's clock, " + readable(time_of(*now));
+  if (of_before) {
+    return fail(Errc::kInvalidInput, what + "of the time before " + clock + ", jumped back from " +
+                                         readable(time_of(clock_.before_jump())));
+  }
+  return fail(Errc::kInvalidInput, what + in_milliseconds(std::chrono::nanoseconds(ahead)) +
+                                       " ahead of " + clock + ", more than the " +
+                                       in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 
 void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
@@ -143,7 +151,9 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
     const HeldVersion* only = &edge;
     const auto at = stamp_for(&only, 1, stamp);
     if (!at) return tl::unexpected(at.error());
-    if (auto ok = check_sample(edge, *at); !ok) return ok;
+    if (stamp) {
+      if (auto ok = check_sample(edge, *at); !ok) return ok;
+    }
     push_value(edge.slot, {X_PC}, *at);
   } else {
     end_revision(push_held(edge.slot, X_PC));
@@ -202,6 +212,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   // Checks all of them, as each counts what it rejects.
   Result<void> fits;
   for (const HeldVersion* edge : to_update_) {
+    if (!stamp) break;
     auto ok = check_sample(*edge, *at);
     if (!ok && fits) fits = std::move(ok);
   }

@@ -97,8 +97,9 @@ class TFDUDE_EXPORT Client {
   /// With a stamp (of the source's clock) the value is a sample. From its first sample on the edge
   /// is dynamic: its value is interpolated between samples, and undefined before and after them.
   /// Without a stamp, the value is a sample with the owner's time of arrival if the edge is
-  /// dynamic, and the value for all times if it is static. An owner whose external clock has no
-  /// time yet rejects samples that need it, with kNotYet.
+  /// dynamic, and the value for all times if it is static. While the owner's clock stands still,
+  /// such a sample replaces the one before. An owner whose external clock has no time yet rejects
+  /// samples that need it, with kNotYet.
   /// @return kUnknownFrame, kTooOld (older than the kept history), kStampTaken.
   [[nodiscard]] Result<void> update(const std::string& id, const Transform& X_PC,
                                     const std::optional<Time>& stamp = std::nullopt);
@@ -299,7 +300,7 @@ class TFDUDE_EXPORT Client {
   /// Sets the external clock of this client, for simulators that embed it and for tests. If the
   /// time is earlier than before, a Node clears the histories of its edges that have samples at
   /// this time or later (clear_history()). Participants that watch these edges are told. Ownership,
-  /// structure and static edges stay.
+  /// structure and static edges stay. Samples that were on their way then are rejected.
   /// @return kInvalidInput: a negative time; the client uses the system's clock.
   [[nodiscard]] Result<void> set_time(Time now);
 

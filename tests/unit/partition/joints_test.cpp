@@ -272,6 +272,18 @@ TEST_CASE("a late sample is added to the history and does not change the newest 
   CHECK(outcome(arm.partition.apply(JointUpdate{{{"elbow", 0.8, 0.01}}, at(3)})) == "stamp_taken");
 }
 
+TEST_CASE("after a history was cleared, an earlier sample is the newest, with its variance") {
+  Arm arm;
+  arm.load();
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.5, 0.04}}, at(5000)}));
+  REQUIRE(arm.forest.clear_histories(Time::min()) == 2);
+  REQUIRE(arm.partition.apply(JointUpdate{{{"elbow", 0.25, 0.01}}, at(1)}));
+  CHECK(arm.info("elbow").position == 0.25);
+  CHECK(std::abs(arm.edge("upper", "fore").covariance.of_specified().stddev()[5] - 0.1) < 1e-12);
+  CHECK(std::abs(arm.edge("upper", "hand").covariance.of_specified().stddev()[5] - 0.5 * 0.1) <
+        1e-12);
+}
+
 TEST_CASE("a frame that is removed or moved by request leaves its joint") {
   Arm arm;
   arm.load();

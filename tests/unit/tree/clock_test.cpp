@@ -71,13 +71,37 @@ TEST_CASE("clock: samples begin at zero") {
   CHECK(outcome(sim.forest.lookup("world", "arm", {Time(-1ns), 0ns, {}})) == "too_old");
 }
 
-TEST_CASE("clock: while it stands still, unstamped updates advance as little as possible") {
+TEST_CASE("clock: while it stands still, unstamped updates are one sample, with the last value") {
   Simulated sim;
   sim.now = ms(7);
-  for (int i = 0; i < 3; ++i) REQUIRE(sim.forest.update("arm", along_x(i)));
+  Query beyond = at(57);
+  beyond.extrapolate = 1s;
+  for (int i = 0; i < 3; ++i) {
+    REQUIRE(sim.forest.update("arm", along_x(i)));
+    CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == i);
+    CHECK(outcome(sim.forest.lookup("world", "arm", beyond)) == "not_yet");
+  }
+  CHECK(sim.forest.histories("arm").at(0).samples == 1);
+  CHECK(sim.forest.histories("arm").at(0).newest == ms(7));
+  // A velocity is told by samples at two times.
+  sim.now = ms(17);
+  REQUIRE(sim.forest.update("arm", along_x(9)));
+  REQUIRE(sim.forest.update("arm", along_x(3)));
+  CHECK(x_of(sim.forest.lookup("world", "arm", at(12))) == testing::Approx(2.5));
+  CHECK(x_of(sim.forest.lookup("world", "arm", beyond)) == testing::Approx(7));
+  // A clock that was set back makes no stamp that is earlier, or told a velocity.
+  sim.now = ms(3);
+  REQUIRE(sim.forest.update({{"arm", along_x(4)}, {"mast", along_x(8)}}));
+  CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == 4);
+  CHECK(x_of(sim.forest.lookup("world", "arm", at(12))) == 3);
   const HistoryInfo history = sim.forest.histories("arm").at(0);
-  CHECK(history.oldest == ms(7));
-  CHECK(history.newest == ms(7) + 2ns);
+  CHECK(history.samples == 2);
+  CHECK(history.newest == ms(17));
+  CHECK(history.refused_equal == 0);
+  // Named twice, the later counts.
+  REQUIRE(sim.forest.update({{"arm", along_x(5)}, {"arm", along_x(6)}}));
+  CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == 6);
+  CHECK(outcome(sim.forest.update("arm", along_x(1), ms(17))) == "stamp_taken");
 }
 
 TEST_CASE("clock: a cleared edge is dynamic and has no value until its next sample") {
@@ -144,6 +168,48 @@ TEST_CASE("clock: after a jump back only what is earlier holds") {
   CHECK(sim.forest.clear_histories(ms(3000)) == 1);
   CHECK(sim.forest.clear_histories(Time::min()) == 1);
   CHECK(sim.forest.clear_histories(Time::min()) == 0);
+}
+
+TEST_CASE("clock: a sample that was on its way when it jumped back is rejected") {
+  const int back = GENERATE(500, 5000, 30'000, 90'000);
+  CAPTURE(back);
+  Simulated sim;
+  EdgeTiming boundless;
+  boundless.max_ahead = std::chrono::nanoseconds::max();
+  REQUIRE(sim.forest.set_timing("hand", boundless));
+  sim.now = ms(100'000);
+  const auto update = [&](const char* id, int t) {
+    return outcome(sim.forest.update(id, along_x(t), ms(t)));
+  };
+  for (const int t : {98'000, 99'900, 100'000}) {
+    REQUIRE(update("arm", t) == "ok");
+    REQUIRE(update("hand", t) == "ok");
+  }
+  const int now = 100'000 - back;
+  sim.now = ms(now);
+  CHECK(sim.forest.clear_histories(ms(now), ms(100'000)) > 0);
+  for (const char* id : {"arm", "hand"}) {
+    for (const int late : {100'100, 100'000, 99'900}) CHECK(update(id, late) == "invalid_input");
+    // Samples may be a little ahead of the clock, as before.
+    CHECK(update(id, now) == "ok");
+    CHECK(update(id, now + 100) == "ok");
+    CHECK(sim.forest.histories(id).at(0).newest == ms(now + 100));
+  }
+  const auto late = sim.forest.update("arm", along_x(0), ms(100'100));
+  CHECK_THAT(late.error().message, ContainsSubstring("'arm'") && ContainsSubstring("100.100 s") &&
+                                       ContainsSubstring("jumped back from 100.000 s"));
+  CHECK(sim.forest.histories("arm").at(0).refused_ahead == 4);
+  // Of another clock.
+  CHECK(update("hand", 400'000) == "ok");
+  REQUIRE(sim.forest.clear_history("hand"));
+  // Samples go on while the clock does.
+  for (int t = now + 200; t < 100'000; t += 100) {
+    sim.now = ms(t - 10);
+    CHECK(update("arm", t) == "ok");
+    if (100'000 - t > 300) CHECK(update("arm", 100'050) == "invalid_input");
+  }
+  sim.now = ms(100'000);
+  CHECK(update("hand", 100'100) == "ok");
 }
 
 TEST_CASE("clock: cleared samples do not count for the limit of memory") {
