@@ -140,6 +140,7 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
     values->incarnation = pages_.incarnation();
     reply.body = *std::move(values);
   } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
+    values.error().message.insert(0, "partition " + quote(name_) + ": ");
     reply.body = std::move(values.error());
   } else {
     // If anything is missing, the caller's structure is not, or no longer, the owner's.

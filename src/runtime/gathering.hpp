@@ -48,10 +48,14 @@ class Gathering {
                                                              SharedHints& hints);
 
  private:
+  /// Says in the error of a second round why the instant was asked for.
+  [[nodiscard]] Error explained(Error error) const;
+
   LookupPlan plan_;
   std::string a_;
   std::string b_;
   std::optional<Time> hint_;
+  std::optional<std::size_t> slowest_;  // the part whose newest instant a second round asks for
 };
 
 }  // namespace tfdude

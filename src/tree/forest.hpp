@@ -94,7 +94,7 @@ struct CommitRange {
 ///   epoch.hpp).
 class Forest {
  public:
-  /// Returns nothing while its time is not known.
+  /// Returns nothing while its time is not known. Thread-safe: readers also call it.
   using Clock = std::function<std::optional<Time>()>;
 
   /// @param clock  stamps updates of dynamic edges that have no stamp; without a clock these are

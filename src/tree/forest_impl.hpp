@@ -21,10 +21,10 @@ namespace tfdude {
 /// (check_sample()), and the clock (StampClock).
 class Forest::Impl {
  public:
-  explicit Impl(Clock clock) : clock_(std::move(clock)) {}
+  explicit Impl(Clock clock) : now_(clock), clock_(std::move(clock)) {}
   ~Impl();
 
-  [[nodiscard]] PathLookup paths() const { return PathLookup(frames_); }
+  [[nodiscard]] PathLookup paths() const { return {frames_, now_}; }
 
   // Structure and values (forest_write.cpp).
 
@@ -155,6 +155,7 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
 
   Frames frames_;
+  const Clock now_;  // for readers
   StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
   EdgeTiming default_timing_ TFDUDE_GUARDED_BY(mutex_);
   std::size_t max_bytes_ TFDUDE_GUARDED_BY(mutex_) = SIZE_MAX;  // of all samples

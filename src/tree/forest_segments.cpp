@@ -4,6 +4,7 @@
 
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/no_data.hpp"
 #include "tree/unspecified_edges.hpp"
 
 // Lookups of segments that another participant asks for.
@@ -257,7 +258,9 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     found = segments_at(*ends, {nanoseconds(*found->stamp), true}, query);
     if (found) found->period = period;
   }
-  if (!found) return found;
+  if (!found) {
+    return tl::unexpected(explained(std::move(found.error()), *ends, query, impl_->now_));
+  }
   describe(*ends, *found);
   if (edges) tell_observed_with(*ends, *found);
   if (hint && found->stamp && hint != found->stamp) {
@@ -278,7 +281,9 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
   auto newest = newest_or_cleared(*ends);
-  if (!newest) return tl::unexpected(std::move(newest.error()));
+  if (!newest) {
+    return tl::unexpected(explained(std::move(newest.error()), *ends, {}, impl_->now_));
+  }
   describe(*ends, *newest);
   std::vector<SegmentValues> all;
   if (newest->stamp) {

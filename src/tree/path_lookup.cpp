@@ -11,6 +11,7 @@
 #include "base/saturating.hpp"
 #include "math/path_accumulation.hpp"
 #include "tree/epoch.hpp"
+#include "tree/no_data.hpp"
 #include "tree/unspecified_edges.hpp"
 
 namespace tfdude {
@@ -49,48 +50,20 @@ void add_noise(Transform& X, const HeldVersion& edge, double seconds) {
   X.covariance = Covariance::trusted(sum);
 }
 
-tl::unexpected<Error> no_data(Errc code, const HeldVersion& edge, std::int64_t t,
-                              const std::string& why) {
-  return fail(code, "the edge of " + quote(edge.name->text) + " has no data for " +
-                        to_string(time_of(t)) + ": " + why);
-}
-
-tl::unexpected<Error> too_old(const HeldVersion& edge, std::int64_t t) {
-  const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
-  // It may be dropped meanwhile.
-  if (oldest == kAlways) return no_data(Errc::kTooOld, edge, t, "it is no longer kept");
-  const std::chrono::nanoseconds gap(saturating_subtract(oldest, t));
-  return no_data(Errc::kTooOld, edge, t, "its oldest sample is " + in_milliseconds(gap) + " later");
-}
-
-tl::unexpected<Error> no_sample(const HeldVersion& edge) {
-  return fail(Errc::kNotYet, "the edge of " + quote(edge.name->text) + " has had no sample " +
-                                 (edge.unsampled() ? "yet" : "since its history was cleared"));
-}
-
-tl::unexpected<Error> not_yet(const HeldVersion& edge, std::int64_t t, const std::string& more) {
-  const std::chrono::nanoseconds gap(t - edge.stamp);
-  return no_data(Errc::kNotYet, edge, t,
-                 "its newest sample is " + in_milliseconds(gap) + " older" + more);
-}
+// The text is added by explained(), where all edges are known.
+tl::unexpected<Error> no_data(Errc code) { return fail(code, {}); }
 
 // Extrapolates beyond the newest sample, up to the allowed limit.
 template <class Value>
 Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query& query,
                             OfEdge<Value>& X) {
-  if (edge.lacks_sample()) return no_sample(edge);
+  if (edge.lacks_sample()) return no_data(Errc::kNotYet);
   const std::int64_t beyond = t - edge.stamp;
-  const std::int64_t limit = query.extrapolate.count();
-  if (limit == 0) return not_yet(edge, t, "");
-  if (beyond > limit) {
-    return not_yet(edge, t,
-                   ", and the extrapolation limit is " + in_milliseconds(query.extrapolate));
-  }
+  if (beyond > query.extrapolate.count()) return no_data(Errc::kNotYet);
   const Sample* before =
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
   const Sample* newest = edge.samples->sample(edge.number);
-  if (before == nullptr || newest == nullptr)
-    return not_yet(edge, t, ", and the only one: cannot extrapolate");
+  if (before == nullptr || newest == nullptr) return no_data(Errc::kNotYet);
   const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
   extrapolate(*before, *newest, value_of<Value>(edge), s, X);
   add_noise(X, edge, seconds(beyond));
@@ -157,7 +130,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
     return {};
   }
   const auto found = edge.samples->around(t, edge.number, moment.back);
-  if (found.before == nullptr) return too_old(edge, t);
+  if (found.before == nullptr) return no_data(Errc::kTooOld);
   if (t == found.before->stamp) {
     OfEdge<Value>& X = path.place();
     X = value_of<Value>(*found.before);
@@ -251,7 +224,7 @@ Result<void> PathLookup::walk_newest(const Ends& ends, Absent absent, Order orde
   auto newest = walk(ends, absent, order, take, X_AB);
   met = {limiting, limiting != nullptr, correlated};
   // It has the earliest of all stamps.
-  if (newest && limiting != nullptr && limiting->lacks_sample()) return no_sample(*limiting);
+  if (newest && limiting != nullptr && limiting->lacks_sample()) return no_data(Errc::kNotYet);
   if (!newest || !mixed || correlated) return newest;
   Query query;
   query.order = order;
@@ -314,6 +287,13 @@ Result<void> PathLookup::reach_at(const Ends& ends, Absent absent, const Instant
   return walked ? pass(std::move(whole), X_AB) : walked;
 }
 
+// Errors are rare, and long to explain.
+[[gnu::cold, gnu::noinline]] tl::unexpected<Error> PathLookup::explain(Error&& error,
+                                                                       const Ends& ends,
+                                                                       const Query& query) const {
+  return tl::unexpected(explained(std::move(error), {ends}, query, clock_));
+}
+
 template <class Value, class Name>
 Result<void> PathLookup::compute(Name a, Name b, Value& X_AB) const {
   const epoch::Guard guard;
@@ -329,6 +309,7 @@ Result<void> PathLookup::compute(Name a, Name b, Value& X_AB) const {
       X_AB = collapse(whole);
     }
   }
+  if (!newest) return explain(std::move(newest.error()), *found, Query{});
   return newest;
 }
 
@@ -343,14 +324,14 @@ Result<void> PathLookup::compute(Name a, Name b, const Query& query, StampedTran
   std::optional<Time> at = query.at;
   if (!at) {
     auto newest = reach_newest(*found, Absent::kEnds, query.order, met, output);
-    if (!newest) return newest;
+    if (!newest) return explain(std::move(newest.error()), *found, query);
     if (met.moving) at = time_of(met.limiting->stamp);
   }
   if (query.at || (at && query.age_noise_until)) {
     met = {};
     const Instant instant{nanoseconds(*at), !query.at};
     auto then = reach_at(*found, Absent::kEnds, instant, query, met, output);
-    if (!then) return then;
+    if (!then) return explain(std::move(then.error()), *found, query);
   }
   if (!met.moving) at.reset();
   X_AB.stamp = at;

@@ -17,7 +17,8 @@ struct Output {
 /// their common ancestor. Stateless; the caller holds an epoch::Guard.
 class PathLookup {
  public:
-  explicit PathLookup(const Frames& frames) : frames_(frames) {}
+  /// @param clock  tells how long ago that was for which an edge has no data; may be null
+  PathLookup(const Frames& frames, const Forest::Clock& clock) : frames_(frames), clock_(clock) {}
 
   /// Whether absent frames end the climb, or may be passed.
   enum class Absent { kEnds, kMayPass };
@@ -42,7 +43,8 @@ class PathLookup {
   /// Met::limiting.
   [[nodiscard]] static Result<void> reach_newest(const Ends& ends, Absent absent, Order order,
                                                  Met& met, Output X_AB);
-  /// X_AB at an instant.
+  /// X_AB at an instant. An error of these two for which an edge has no data has no text; see
+  /// explained().
   [[nodiscard]] static Result<void> reach_at(const Ends& ends, Absent absent, const Instant& at,
                                              const Query& query, Met& met, Output X_AB);
 
@@ -73,6 +75,9 @@ class PathLookup {
   [[nodiscard]] Result<void> compute(Name a, Name b, const Query& query,
                                      StampedTransform& X_AB) const;
 
+  [[nodiscard]] tl::unexpected<Error> explain(Error&& error, const Ends& ends,
+                                              const Query& query) const;
+
   /// The walk that all lookups share. `take` gets the accumulation of an edge, and the edge, whose
   /// value it adds. The walk stops at an error of `take`.
   template <class Value, class Take>
@@ -86,6 +91,7 @@ class PathLookup {
                                             const Query& query, Met& met, Value& X_AB);
 
   const Frames& frames_;
+  const Forest::Clock& clock_;
 };
 
 }  // namespace tfdude

@@ -1,0 +1,171 @@
+#include "tree/no_data.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/saturating.hpp"
+
+namespace tfdude {
+namespace {
+
+// A dynamic edge, with the stamps of its samples.
+struct DatedEdge {
+  const HeldVersion* edge = nullptr;
+  std::int64_t oldest = 0;
+  std::int64_t newest = 0;
+
+  [[nodiscard]] std::string name() const { return "the edge of " + quote(edge->name->text); }
+};
+
+DatedEdge dated(const HeldVersion& edge) {
+  // The oldest may be dropped meanwhile, but there always is a newest.
+  const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
+  return {&edge, oldest == kAlways ? edge.stamp : std::min(oldest, edge.stamp), edge.stamp};
+}
+
+std::vector<DatedEdge> dynamic_edges(const std::vector<Ends>& segments) {
+  std::vector<DatedEdge> found;
+  for (const Ends& ends : segments) {
+    const Version* a = ends.a;
+    const Version* b = ends.b;
+    while (a != b) {
+      const Version*& here = a->depth >= b->depth ? a : b;
+      if (here->above == nullptr) break;
+      if (here->held()) {
+        const auto& edge = static_cast<const HeldVersion&>(*here);
+        if (edge.moving()) found.push_back(dated(edge));
+      }
+      here = Frames::at(*here->above, ends.commit);
+    }
+  }
+  return found;
+}
+
+// Writes instants, and how long ago they were if the clock can be that of their stamps.
+class Writer {
+ public:
+  explicit Writer(const Forest::Clock& clock) : now_(clock ? clock() : std::nullopt) {}
+
+  [[nodiscard]] std::string instant(std::int64_t t) const {
+    return readable(time_of(t)) + (is_near(t) ? " (" + age(t) + ")" : "");
+  }
+  [[nodiscard]] std::string span(std::int64_t from, std::int64_t to) const {
+    if (from == to) return instant(to);
+    const std::string ages =
+        is_near(from) && is_near(to) ? " (" + age(from) + " to " + age(to) + ")" : "";
+    std::string begin = readable(time_of(from));
+    std::string end = readable(time_of(to));
+    // "2026-11-26 07:12:03.123 to 07:12:15.234 UTC".
+    constexpr std::size_t kDate = 11;
+    constexpr std::string_view kZone = " UTC";
+    if (begin.size() == end.size() && begin.size() > kDate + kZone.size() &&
+        begin.compare(0, kDate, end, 0, kDate) == 0) {
+      begin.resize(begin.size() - kZone.size());
+      end.erase(0, kDate);
+    }
+    return begin + " to " + end + ages;
+  }
+
+ private:
+  // Stamps that are further away are of another clock.
+  [[nodiscard]] bool is_near(std::int64_t t) const {
+    constexpr std::int64_t kDay = 86'400'000'000'000;
+    return now_ && std::abs(saturating_subtract(nanoseconds(*now_), std::max(t, kNoSample))) < kDay;
+  }
+  [[nodiscard]] std::string age(std::int64_t t) const {
+    const std::chrono::nanoseconds ago(nanoseconds(*now_) - t);
+    return ago.count() >= 0 ? readable(ago) + " ago" : "in " + readable(-ago);
+  }
+
+  const std::optional<Time> now_;
+};
+
+std::string gap(std::int64_t from, std::int64_t to) {
+  return readable(std::chrono::nanoseconds(saturating_subtract(to, from)));
+}
+
+// Why an edge has no data after its newest sample.
+std::string beyond(const DatedEdge& edge, std::int64_t t, const Query& query) {
+  std::string text = "its newest sample is " + gap(edge.newest, t) + " older";
+  if (query.extrapolate.count() == 0) return text;
+  if (t - edge.newest > query.extrapolate.count())
+    return text + ", and the extrapolation limit is " + readable(query.extrapolate);
+  return text + ", and the only one: cannot extrapolate";
+}
+
+// The edge with the oldest newest sample, of those that cannot be extrapolated until t.
+const DatedEdge& first_to_end(const std::vector<DatedEdge>& edges, const DatedEdge& slowest,
+                              std::int64_t t, const Query& query) {
+  const DatedEdge* found = nullptr;
+  for (const DatedEdge& one : edges) {
+    const bool ends =
+        t > one.newest && (t - one.newest > query.extrapolate.count() || one.oldest == one.newest);
+    if (ends && (found == nullptr || one.newest < found->newest)) found = &one;
+  }
+  return found != nullptr ? *found : slowest;
+}
+
+// When all of these edges have data.
+std::string all_of(const std::vector<DatedEdge>& edges, const DatedEdge& youngest,
+                   const DatedEdge& slowest, const Writer& writer) {
+  if (edges.size() < 2) return {};
+  const std::string all = std::to_string(edges.size()) + " dynamic edges here have ";
+  if (youngest.oldest <= slowest.newest) {
+    return "; all " + all + "data from " + writer.span(youngest.oldest, slowest.newest);
+  }
+  return "; the " + all + "no instant in common: " + slowest.name() + " has samples until " +
+         writer.instant(slowest.newest) + ", " + youngest.name() + " from " +
+         writer.instant(youngest.oldest) + " on";
+}
+
+}  // namespace
+
+Error explained(Error error, const std::vector<Ends>& segments, const Query& query,
+                const Forest::Clock& clock) {
+  if (!error.message.empty()) return error;
+  std::vector<DatedEdge> edges = dynamic_edges(segments);
+  // At the latest common time, an edge that had no sample yet has its first value.
+  const auto lacks = std::find_if(edges.begin(), edges.end(), [&](const DatedEdge& one) {
+    return one.edge->lacks_sample() && (query.at || !one.edge->unsampled());
+  });
+  if (lacks != edges.end()) {
+    error.message = lacks->name() + " has had no sample " +
+                    (lacks->edge->unsampled() ? "yet" : "since its history was cleared");
+    return error;
+  }
+  edges.erase(std::remove_if(edges.begin(), edges.end(),
+                             [](const DatedEdge& one) { return one.edge->unsampled(); }),
+              edges.end());
+  const auto later = [](const DatedEdge& a, const DatedEdge& b) { return a.oldest < b.oldest; };
+  const auto slower = [](const DatedEdge& a, const DatedEdge& b) { return a.newest < b.newest; };
+  const auto youngest = std::max_element(edges.begin(), edges.end(), later);
+  const auto slowest = std::min_element(edges.begin(), edges.end(), slower);
+  if (youngest == edges.end()) {
+    error.message = "an edge of the path has no data";
+    return error;
+  }
+  const Writer writer(clock);
+  const std::int64_t t = query.at ? nanoseconds(*query.at) : slowest->newest;
+  const bool is_old = error.code == Errc::kTooOld;
+  const DatedEdge& limiting = is_old ? *youngest : first_to_end(edges, *slowest, t, query);
+  error.message = query.at ? "" : "there is no latest common time: ";
+  error.message += limiting.name() + " has no data for " + writer.instant(t) + ": ";
+  if (!is_old) {
+    error.message += beyond(limiting, t, query);
+  } else if (limiting.oldest > t) {
+    error.message += "its oldest sample is " + gap(t, limiting.oldest) + " later";
+  } else {
+    error.message += "it is no longer kept";
+  }
+  const bool single = limiting.oldest == limiting.newest;
+  error.message += std::string("; it has ") + (single ? "one sample, of " : "samples from ") +
+                   writer.span(limiting.oldest, limiting.newest) +
+                   all_of(edges, *youngest, *slowest, writer);
+  return error;
+}
+
+}  // namespace tfdude
