@@ -1,6 +1,8 @@
 #include "tfdude-ros/logic/joints.hpp"
 
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,6 +69,27 @@ TEST_CASE("ros joints: joints that several partitions have are not sent") {
   CHECK(message.names == Names{"wrist"});
   CHECK(message.positions == std::vector<double>{2});
   CHECK(JointExport::drop_repeated(message).empty());
+}
+
+TEST_CASE("ros joints: unusual stamps are counted, and each is reported once") {
+  JointImport import({});
+  const auto reports = [&](std::int64_t stamp, double position) {
+    const auto taken = import.take({time_of(stamp), {"elbow"}, {position}});
+    CHECK(taken.joints.size() == 1);
+    CHECK(taken.stamp == (stamp == 0 ? std::nullopt : std::optional<Time>(time_of(stamp))));
+    return taken.reports.size();
+  };
+  CHECK(reports(7, 1) == 0);
+  CHECK(reports(7, 1) == 0);
+  CHECK(import.stamps().counts().same == 1);
+  CHECK(reports(7, 2) == 1);
+  CHECK(reports(7, 3) == 0);
+  CHECK(import.stamps().counts().repeated == 2);
+  CHECK(reports(0, 1) == 1);
+  CHECK(reports(0, 2) == 0);
+  CHECK(import.stamps().counts().unstamped == 2);
+  CHECK(reports(5, 1) == 0);
+  CHECK(import.stamps().counts().repeated == 2);
 }
 
 TEST_CASE("ros joints: measured joints are sent, unless a node of ROS publishes them") {

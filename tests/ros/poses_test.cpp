@@ -119,6 +119,13 @@ TEST_CASE("ros poses: a message without a usable covariance is no measurement") 
   PoseWithCovariance message = *message_of(kOut, example(), Time());
   message.stamp = Time();
   CHECK(!measurement_of(kIn, message, "tool")->stamp);
+  // Without a stamp, it may be another measurement with the same result.
+  CHECK(!is_repeat(message, message));
+  message.stamp = time_of(7);
+  PoseWithCovariance other = message;
+  CHECK(is_repeat(other, message));
+  other.pose.xyz[0] += 1e-3;
+  CHECK(!is_repeat(other, message));
   const auto why = [&] { return measurement_of(kIn, message, "tool").error().message; };
   message.covariance[1] += 1;
   CHECK_THAT(why(), ContainsSubstring("symmetric"));

@@ -66,6 +66,42 @@ TEST_CASE("ros tf in: a dynamic and a static frame have the peer's values and st
   CHECK(bridge.wait(testing::in_time()) == 0);
 }
 
+TEST_CASE("ros tf in: transforms without a stamp are samples of the time of their arrival") {
+  const RosRig rig;
+  auto bridge = rig.start_bridge();
+  RosPeer peer(rig.ros_domain());
+  Client client = rig.client();
+  peer.advertise("/tf", "tf", "reliable");
+  const auto x = [&] {
+    const auto X = client.lookup("map", "odom", Query{});
+    return X && X->stamp ? X->pose.translation().x() : -1;
+  };
+  const Time before = client.now().value();
+  for (int k = 0; k < 5; ++k) {
+    peer.publish("/tf", tf_message(Time(), {{"map", "odom", pose(k, 0)}}));
+    REQUIRE(eventually([&] { return x() == k; }));
+  }
+  const auto newest = client.lookup("map", "odom", Query{}).value().stamp;
+  CHECK(newest.value() > before);
+  CHECK(client.history("odom").value().at(0).samples == 5);
+  // The first of two values of one stamp stays.
+  for (const double value : {7.0, 7.0, 8.0}) {
+    peer.publish("/tf", tf_message(at(1e8), {{"map", "odom", pose(value, 0)}}));
+  }
+  peer.publish("/tf", tf_message(at(1e8 + 1), {{"map", "odom", pose(9, 0)}}));
+  REQUIRE(eventually([&] { return x() == 9; }));
+  Query query;
+  query.at = at(1e8);
+  CHECK(client.lookup("map", "odom", query).value().pose.translation().x() == 7);
+
+  bridge.signal(SIGTERM);
+  CHECK(bridge.wait(testing::in_time()) == 0);
+  CHECK_THAT(bridge.err(),
+             testing::ContainsSubstring("unstamped=5 same=1 repeated=1") &&
+                 testing::ContainsSubstring("frame 'odom': its message has no stamp") &&
+                 testing::ContainsSubstring("another value for a stamp"));
+}
+
 TEST_CASE("ros tf in: both domains may be the same") {
   const RosRig rig;
   RosPeer peer(rig.ros_domain());

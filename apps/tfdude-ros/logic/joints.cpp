@@ -9,8 +9,7 @@ namespace tfdude::ros {
 
 JointPositions JointImport::take(const JointState& message) {
   JointPositions out;
-  // A stamp of zero is one that was not set.
-  if (message.stamp != Time()) out.stamp = message.stamp;
+  out.stamp = given_stamp(message.stamp);
   std::set<std::string> seen;
   for (std::size_t i = 0; i < message.names.size(); ++i) {
     const std::string& name = message.names[i];
@@ -27,10 +26,33 @@ JointPositions JointImport::take(const JointState& message) {
     const auto stddev = own == settings_.stddev_of.end() ? settings_.stddev : own->second;
     JointValue joint{scope + id, message.positions[i]};
     if (stddev) joint.variance = *stddev * *stddev;
+    if (out.stamp) note(joint, *out.stamp, out.reports);
     out.joints.push_back(std::move(joint));
     ++counts_.taken;
   }
+  if (!out.stamp && !out.joints.empty()) {
+    const auto report =
+        stamps_.unstamped("joint " + quote(out.joints.front().name) + " and those beside it",
+                          "taken as of the time of its arrival");
+    if (report) out.reports.push_back(*report);
+  }
   return out;
+}
+
+void JointImport::note(const JointValue& joint, Time stamp, std::vector<std::string>& reports) {
+  // Names that nobody has here need not be known.
+  constexpr std::size_t kMost = 10'000;
+  const auto known = newest_.find(joint.name);
+  if (known == newest_.end()) {
+    if (newest_.size() < kMost) newest_.emplace(joint.name, Newest{stamp, joint.position});
+  } else if (stamp != known->second.stamp) {
+    // Also after a jump back of time.
+    known->second = {stamp, joint.position};
+  } else if (joint.position == known->second.position) {
+    stamps_.same();
+  } else if (const auto report = stamps_.repeated("joint " + quote(joint.name), readable(stamp))) {
+    reports.push_back(*report);
+  }
 }
 
 void JointExport::heard(const JointState& message) {

@@ -5,12 +5,14 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "tfdude/types/joint_spec.hpp"
 
 #include "../messages.hpp"
 #include "names.hpp"
+#include "stamps.hpp"
 
 // The joints of /joint_states and those of tf-dude. No DDS, no threads and no clock.
 namespace tfdude::ros {
@@ -33,6 +35,7 @@ struct JointCounts {
 struct JointPositions {
   std::optional<Time> stamp;
   std::vector<JointValue> joints;
+  std::vector<std::string> reports{};  ///< each once, for the log
 };
 
 class JointImport {
@@ -43,10 +46,21 @@ class JointImport {
   [[nodiscard]] JointPositions take(const JointState& message);
 
   [[nodiscard]] const JointCounts& counts() const { return counts_; }
+  [[nodiscard]] const StampReports& stamps() const { return stamps_; }
 
  private:
+  struct Newest {
+    Time stamp;
+    double position = 0;
+  };
+
+  /// Counts a repeated stamp. The owner decides what holds: it may have cleared its history.
+  void note(const JointValue& joint, Time stamp, std::vector<std::string>& reports);
+
   JointImportSettings settings_;
   JointCounts counts_;
+  StampReports stamps_;
+  std::unordered_map<std::string, Newest> newest_;  // by the joint's name here
 };
 
 struct JointExportSettings {

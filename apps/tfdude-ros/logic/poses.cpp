@@ -5,6 +5,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "names.hpp"
+#include "stamps.hpp"
 
 namespace tfdude::ros {
 namespace {
@@ -41,6 +42,12 @@ std::optional<Odometry> message_of(const PoseOut& out, const StampedTransform& X
   return message;
 }
 
+bool is_repeat(const PoseWithCovariance& message, const PoseWithCovariance& before) {
+  return given_stamp(message.stamp) && message.stamp == before.stamp &&
+         message.frame == before.frame && message.pose.xyz == before.pose.xyz &&
+         message.pose.quat == before.pose.quat && message.covariance == before.covariance;
+}
+
 Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
                                    const std::string& child) {
   auto a = id_of(message.frame, in.prefix);
@@ -58,7 +65,7 @@ Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& m
   const auto ros = Covariance::from_matrix(Eigen::Map<const RowMajor>(numbers.data()));
   if (!ros) return tl::unexpected(ros.error());
   Measurement out{*std::move(a), *std::move(b), from_ros_covariance(*pose, *ros), std::nullopt};
-  if (message.stamp != Time()) out.stamp = message.stamp;
+  out.stamp = given_stamp(message.stamp);
   return out;
 }
 

@@ -51,6 +51,9 @@ struct Measurement {
   std::optional<Time> stamp;
 };
 
+/// Whether a message with a stamp is that before it once more.
+[[nodiscard]] bool is_repeat(const PoseWithCovariance& message, const PoseWithCovariance& before);
+
 /// @return kInvalidInput naming the field: a name, the pose, a covariance that is not one. All
 ///   zero, or -1 as the first number, means in ROS that it is not known.
 [[nodiscard]] Result<Measurement> measurement_of(const PoseIn& in,

@@ -38,10 +38,11 @@ bool equal(const Pose& a, const Pose& b) {
 }  // namespace
 
 TfImport::Changes TfImport::take(const TfMessage& message, const std::string& writer,
-                                 bool is_static, SteadyTime now, const WhoHolds& who_holds) {
+                                 bool is_static, SteadyTime now, const WhoHolds& who_holds,
+                                 std::optional<Time> arrival) {
   Changes changes;
   for (const TransformStamped& transform : message) {
-    take_one(transform, writer, is_static, now, who_holds, changes);
+    take_one(transform, writer, is_static, now, who_holds, arrival, changes);
   }
   return changes;
 }
@@ -49,7 +50,7 @@ TfImport::Changes TfImport::take(const TfMessage& message, const std::string& wr
 TfImport::Changes TfImport::retry(SteadyTime now, const WhoHolds& who_holds) {
   Changes changes;
   for (const auto& [name, held] : std::exchange(held_back_, {})) {
-    take_one(held.transform, held.writer, true, now, who_holds, changes);
+    take_one(held.transform, held.writer, true, now, who_holds, std::nullopt, changes);
   }
   return changes;
 }
@@ -74,17 +75,31 @@ Holding TfImport::holding(const std::string& id, const WhoHolds& who_holds) cons
 
 std::optional<std::string> TfImport::rejected(const std::string& id, const Error& error) {
   ++counts_.rejected;
-  if (error.code == Errc::kTooOld || error.code == Errc::kStampTaken) return std::nullopt;
+  const std::string who = "frame " + quote(id);
   entries_.erase(id);
   if (!is_first("rejected " + id + std::string(tfdude::to_string(error.code)))) return std::nullopt;
-  return "not taken: frame " + quote(id) + ": " + error.message;
+  return "not taken: " + who + ": " + error.message;
+}
+
+std::optional<std::string> TfImport::rejected_sample(const std::string& id, const Error& error) {
+  const std::string who = "frame " + quote(id);
+  switch (error.code) {
+    case Errc::kStampTaken:
+      return stamps_.repeated(who, error.message);
+    case Errc::kTooOld:
+      return stamps_.old(who, error.message);
+    case Errc::kInvalidInput:  // its numbers were checked
+      return stamps_.early(who, error.message);
+    default:
+      return rejected(id, error);
+  }
 }
 
 void TfImport::take_one(const TransformStamped& transform, const std::string& writer,
                         bool is_static, SteadyTime now, const WhoHolds& who_holds,
-                        Changes& changes) {
-  const auto one = check(transform, is_static, changes);
-  if (!one) return;
+                        std::optional<Time> arrival, Changes& changes) {
+  auto one = check(transform, is_static, changes);
+  if (!one || !date(*one, arrival, changes)) return;
   const bool may =
       may_take(*one, writer, who_holds, changes) && has_parent(*one, who_holds, changes);
   if (!may) {
@@ -117,11 +132,20 @@ std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transfo
     report_once("value " + *id, "not taken: frame " + quote(*id) + ": " + why, changes);
     return std::nullopt;
   }
-  return Checked{*std::move(id),
-                 *std::move(parent),
-                 {*pose, settings_.covariance},
-                 transform.stamp,
-                 is_static};
+  return Checked{*std::move(id),  *std::move(parent), {*pose, settings_.covariance},
+                 transform.stamp, is_static,          given_stamp(transform.stamp).has_value()};
+}
+
+bool TfImport::date(Checked& one, std::optional<Time> arrival, Changes& changes) {
+  if (one.is_static || one.is_stamped) return true;
+  const std::string who = "frame " + quote(one.id);
+  const auto report = stamps_.unstamped(who, "taken as a sample of the time of its arrival");
+  if (report) changes.reports.push_back(*report);
+  one.stamp = arrival.value_or(Time());
+  if (arrival) return true;
+  ++counts_.timeless;
+  report_once("timeless " + one.id, "not taken: " + who + ": the clock has no time yet", changes);
+  return false;
 }
 
 bool TfImport::may_take(const Checked& one, const std::string& writer, const WhoHolds& who_holds,
@@ -199,7 +223,10 @@ void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime n
   const auto edit = edit_for(one, entry, jumped);
   if (edit) changes.edits.push_back({*edit, one.id, one.parent, one.X_PC});
   if (!one.is_static) {
-    batch_of(one.stamp, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+    // While the clock stands still, the sample before is replaced.
+    const bool replaces = !one.is_stamped && !edit && !entry.is_static && one.stamp <= entry.newest;
+    const auto stamp = replaces ? std::nullopt : std::optional<Time>(one.stamp);
+    batch_of(stamp, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
   } else if (!edit && !equal(entry.X_PC, one.X_PC.pose)) {
     batch_of(std::nullopt, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
   }
@@ -217,7 +244,7 @@ void TfImport::report_jump(const Checked& one, Time newest, SteadyTime now, Chan
   if (jump_reported_ && now - *jump_reported_ < kSilent) return;
   jump_reported_ = now;
   changes.reports.push_back("frame " + quote(one.id) + ": time has jumped back from " +
-                            to_string(newest) + " to " + to_string(one.stamp) +
+                            readable(newest) + " to " + readable(one.stamp) +
                             "; its samples are dropped, and those of all frames that jump, too");
 }
 

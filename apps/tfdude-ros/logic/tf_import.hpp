@@ -16,6 +16,7 @@
 
 #include "../messages.hpp"
 #include "names.hpp"
+#include "stamps.hpp"
 
 // What the transforms of ROS change in the partition that the bridge serves for them. No DDS, no
 // threads and no clock.
@@ -40,7 +41,8 @@ struct ImportCounts {
   std::uint64_t values = 0;     ///< not a rigid transform, or a frame in itself
   std::uint64_t owned = 0;      ///< the frame belongs to another partition, or may
   std::uint64_t contested = 0;  ///< another publisher gives the frame another parent
-  std::uint64_t rejected = 0;   ///< by the partition: too old, repeated, a cycle...
+  std::uint64_t rejected = 0;   ///< by the partition: a cycle, too old...
+  std::uint64_t timeless = 0;   ///< without a stamp, while the clock has no time yet
 };
 
 struct ImportSettings {
@@ -67,7 +69,8 @@ class TfImport {
     std::string parent{};
     std::optional<Transform> X_PC{};
   };
-  /// Values with one stamp; without, they hold for all times.
+  /// Values with one stamp. Without, they hold for all times; but those of edges that have samples
+  /// are of the present, as the partition's clock says.
   struct Batch {
     std::optional<Time> stamp;
     std::vector<EdgeUpdate> edges;
@@ -84,8 +87,11 @@ class TfImport {
   explicit TfImport(ImportSettings settings) : settings_(std::move(settings)) {}
 
   /// @param writer  its GUID
+  /// @param arrival  the time of the partition's clock, for samples without a stamp; absent: it is
+  ///   not known yet
   [[nodiscard]] Changes take(const TfMessage& message, const std::string& writer, bool is_static,
-                             SteadyTime now, const WhoHolds& who_holds);
+                             SteadyTime now, const WhoHolds& who_holds,
+                             std::optional<Time> arrival = std::nullopt);
 
   /// Static transforms come only once. Takes those again that were not taken because of their
   /// owner. Call when the structure has changed.
@@ -100,8 +106,14 @@ class TfImport {
   /// over with the next message.
   /// @return a report for the log, if it is the first of this kind
   [[nodiscard]] std::optional<std::string> rejected(const std::string& id, const Error& error);
+  /// Likewise for a sample.
+  [[nodiscard]] std::optional<std::string> rejected_sample(const std::string& id,
+                                                           const Error& error);
+  /// The partition has the very sample that it rejected for its stamp.
+  void repeated_alike() { stamps_.same(); }
 
   [[nodiscard]] const ImportCounts& counts() const { return counts_; }
+  [[nodiscard]] const StampReports& stamps() const { return stamps_; }
 
  private:
   struct Entry {
@@ -123,14 +135,18 @@ class TfImport {
     std::string id;
     std::string parent;
     Transform X_PC;
-    Time stamp;
+    Time stamp;  // without one, that of the arrival
     bool is_static;
+    bool is_stamped;
   };
 
   void take_one(const TransformStamped& transform, const std::string& writer, bool is_static,
-                SteadyTime now, const WhoHolds& who_holds, Changes& changes);
+                SteadyTime now, const WhoHolds& who_holds, std::optional<Time> arrival,
+                Changes& changes);
   [[nodiscard]] std::optional<Checked> check(const TransformStamped& transform, bool is_static,
                                              Changes& changes);
+  /// Dates a sample without a stamp. @return whether that is possible
+  [[nodiscard]] bool date(Checked& one, std::optional<Time> arrival, Changes& changes);
   [[nodiscard]] Holding holding(const std::string& id, const WhoHolds& who_holds) const;
   [[nodiscard]] bool may_take(const Checked& one, const std::string& writer,
                               const WhoHolds& who_holds, Changes& changes);
@@ -153,6 +169,7 @@ class TfImport {
   std::set<std::string> reported_;
   std::optional<SteadyTime> jump_reported_;
   ImportCounts counts_;
+  StampReports stamps_;
 };
 
 }  // namespace tfdude::ros

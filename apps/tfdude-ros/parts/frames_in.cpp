@@ -29,9 +29,9 @@ void FramesIn::stop() {
   const ImportCounts& counts = import_.counts();
   spdlog::info(
       "transforms of ROS: taken={} not taken: names={} values={} owned={} contested={} rejected={} "
-      "dropped messages={}",
+      "timeless={}; of their stamps: {}; dropped messages={}",
       counts.taken, counts.names, counts.values, counts.owned, counts.contested, counts.rejected,
-      worker_.dropped());
+      counts.timeless, import_.stamps().summary(), worker_.dropped());
 }
 
 void FramesIn::on_change(const Change& change) {
@@ -63,8 +63,11 @@ void FramesIn::give_up(std::set<std::string> frames) {
 
 void FramesIn::take(const TfMessage& message, const std::string& writer, bool is_static) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  apply(import_.take(message, writer, is_static, cli::Worker::Clock::now(),
-                     [this](const std::string& id) { return structure_.holding(id); }));
+  const auto arrival = node_.now();
+  apply(import_.take(
+      message, writer, is_static, cli::Worker::Clock::now(),
+      [this](const std::string& id) { return structure_.holding(id); },
+      arrival ? std::optional<Time>(*arrival) : std::nullopt));
 }
 
 void FramesIn::apply(const TfImport::Changes& changes) {
@@ -96,12 +99,31 @@ void FramesIn::apply(const TfImport::Batch& batch) {
   for (const EdgeUpdate& edge : batch.edges) {
     const auto alone =
         batch.edges.size() == 1 ? done : node_.update(edge.id, edge.X_PC, batch.stamp);
-    if (!alone) rejected(edge.id, alone.error());
+    if (alone) continue;
+    if (alone.error().code == Errc::kStampTaken && has(edge, batch.stamp)) {
+      import_.repeated_alike();
+    } else {
+      log(import_.rejected_sample(edge.id, alone.error()));
+    }
   }
 }
 
+bool FramesIn::has(const EdgeUpdate& edge, std::optional<Time> stamp) {
+  constexpr double kRounding = 1e-12;
+  const auto parent = node_.parent(edge.id);
+  if (!parent) return false;
+  Query query;
+  query.at = stamp;
+  const auto there = node_.lookup(*parent, edge.id, query);
+  return there && there->pose.matrix().isApprox(edge.X_PC.pose.matrix(), kRounding);
+}
+
 void FramesIn::rejected(const std::string& id, const Error& error) {
-  if (const auto report = import_.rejected(id, error)) spdlog::warn("{}", *report);
+  log(import_.rejected(id, error));
+}
+
+void FramesIn::log(const std::optional<std::string>& report) {
+  if (report) spdlog::warn("{}", *report);
   structure_.changed();
 }
 

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -42,6 +43,10 @@ class FramesIn {
   void apply(const TfImport::Edit& edit);
   void apply(const TfImport::Batch& batch);
   void rejected(const std::string& id, const Error& error);
+  /// Of something that was not applied.
+  void log(const std::optional<std::string>& report);
+  /// Whether the edge has this sample.
+  [[nodiscard]] bool has(const EdgeUpdate& edge, std::optional<Time> stamp);
 
   Node& node_;
   Structure structure_;

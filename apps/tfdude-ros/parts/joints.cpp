@@ -19,12 +19,14 @@ Result<void> JointsIn::start(RosDomain& domain, const IsNeighbour& is_own) {
 
 void JointsIn::stop() {
   worker_.stop();
-  spdlog::info("joints of ROS: taken={} refused={} dropped messages={}", import_.counts().taken,
-               import_.counts().refused, worker_.dropped());
+  spdlog::info("joints of ROS: taken={} refused={}; of their stamps: {}; dropped messages={}",
+               import_.counts().taken, import_.counts().refused, import_.stamps().summary(),
+               worker_.dropped());
 }
 
 void JointsIn::take(const JointState& message) {
   JointPositions positions = import_.take(message);
+  for (const std::string& report : positions.reports) spdlog::warn("{}", report);
   if (positions.joints.empty()) return;
   const auto sent = node_.publish_joints(std::move(positions.joints), positions.stamp);
   const std::string error = sent ? std::string() : sent.error().message;

@@ -106,15 +106,23 @@ Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
 
 void PoseObserver::stop() {
   worker_.stop();
-  spdlog::info("{}: accepted={} rejected by the gate={} failed={} dropped messages={}",
-               settings_.topic, accepted_, rejected_, failed_, worker_.dropped());
+  spdlog::info(
+      "{}: accepted={} rejected by the gate={} failed={}; of their stamps: {}; dropped messages={}",
+      settings_.topic, accepted_, rejected_, failed_, stamps_.summary(), worker_.dropped());
 }
 
 void PoseObserver::take(const PoseWithCovariance& message, const std::string& child) {
+  // The same measurement twice would count as two.
+  if (last_ && is_repeat(message, *last_)) return stamps_.same();
+  if (!given_stamp(message.stamp)) {
+    const auto report = stamps_.unstamped(settings_.topic, "observed at the latest common time");
+    if (report) spdlog::warn("{}", *report);
+  }
   const auto observed = measurement_of(settings_, message, child).and_then([&](const auto& one) {
     return node_.observe(one.a, one.b, one.X_AB, one.stamp, settings_.options);
   });
   if (observed) {
+    last_ = message;
     ++(observed->accepted ? accepted_ : rejected_);
     logged_.clear();
     return;

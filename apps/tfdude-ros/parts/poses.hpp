@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -11,6 +12,7 @@
 
 #include "../../worker.hpp"
 #include "../logic/poses.hpp"
+#include "../logic/stamps.hpp"
 #include "../ros_domain.hpp"
 
 namespace tfdude::ros {
@@ -64,6 +66,8 @@ class PoseObserver {
   std::uint64_t rejected_ = 0;  // by the gate
   std::uint64_t failed_ = 0;
   std::string logged_;
+  StampReports stamps_;
+  std::optional<PoseWithCovariance> last_;
   cli::Worker worker_{100};  // last: it uses the other members
 };
 
