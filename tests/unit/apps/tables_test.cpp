@@ -95,6 +95,21 @@ TEST_CASE("tables: long names and numbers of joints fit 80 columns") {
   CHECK_THAT(joint_table({longest()}, kDegree), ContainsSubstring("  left_arm…pan_joint "));
 }
 
+TEST_CASE("tables: joints of one name in several partitions are named") {
+  JointInfo mimic = shoulder();
+  mimic.mimic = Mimic{"elbow", 1, 0};
+  SameNames same;
+  same.add("left", {shoulder()});
+  same.add("right", {shoulder()});
+  same.add("tool", {mimic});
+  CHECK(same.others("left", shoulder()) == std::vector<std::string>{"right"});
+  CHECK(same.others("tool", mimic).empty());
+  CHECK(same.warnings("left", {shoulder()}) ==
+        "    conflict: shoulder_pan_joint is also a joint of right; publish it as "
+        "left/shoulder_pan_joint\n");
+  CHECK(same.warnings("tool", {mimic}).empty());
+}
+
 TEST_CASE("tables: rates of edges fit 80 columns") {
   const HistoryInfo history = history_of("shoulder_link");
   const std::string table = monitor_table("arm", {history}, *history.newest);
