@@ -117,7 +117,7 @@ Result<Covariance> Covariance::from_upper(const Upper& upper) {
       }
       if (std::abs(value) > kMaxVariance) {
         return fail(Errc::kInvalidInput,
-                    element(i, j) + " is " + number(value) + ", which is beyond 1e18");
+                    element(i, j) + " is " + number_text(value) + ", which is beyond 1e18");
       }
     }
   }
@@ -135,7 +135,7 @@ Result<Covariance> Covariance::from_stddev(const std::array<double, 6>& stddev) 
     if (stddev[i] < 0) return fail(Errc::kInvalidInput, field + " is negative");
     if (stddev[i] > std::sqrt(kMaxVariance))
       return fail(Errc::kInvalidInput,
-                  field + " is " + number(stddev[i]) + ", which is beyond 1e9");
+                  field + " is " + number_text(stddev[i]) + ", which is beyond 1e9");
     upper[upper_index(i, i)] = stddev[i] * stddev[i];
   }
   return trusted(upper);
