@@ -177,7 +177,8 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, const Config& config) co
   std::string place = nth;
   if (node.IsMap()) {
     const auto found = std::find_if(node.begin(), node.end(), is_id);
-    if (found != node.end() && found->second.IsScalar() && check_id(found->second.Scalar(), "id")) {
+    if (found != node.end() && found->second.IsScalar() &&
+        check_new_id(found->second.Scalar(), "id")) {
       place = "frame " + tfdude::quote(found->second.Scalar());
     }
   }

@@ -112,7 +112,7 @@ TEST_CASE("urdf: text that is not a URDF is rejected") {
     CHECK(frames.error().code == Errc::kConfig);
   };
   bad_number(limits("nan", "1"), "lower value (nan) is not a");
-  bad_number(limits("0", "inf"), "upper value (inf) is not a");
+  bad_number(limits("0", "infinite"), "upper value (infinite) is not a");
   bad_number(limits("0", "1e999"), "upper value (1e999) is not a");
   bad_number(limits("0", "1") + "<origin xyz=\"0 nan 0\"/>", "Unable to parse component [nan]");
   bad_number(limits("0", "1") + "<origin rpy=\"0 0 inf\"/>", "Unable to parse component [inf]");
