@@ -73,7 +73,11 @@ bool PartitionWatches::attend(const Followed& partition, bool renew) {
   }
   std::vector<Part> parts;
   for (PartitionPlan::Group& group : plan->groups) {
-    if (!open_.contains(group.id) && links_.open(partition->name(), group.id)) {
+    if (!open_.contains(group.id)) {
+      if (auto opened = links_.open(partition->name(), group.id); !opened) {
+        partition->interrupt(opened.error().message);
+        return true;  // until the next renewal
+      }
       open_.insert(group.id, Clock::now());
     }
     parts.push_back(std::move(group.part));

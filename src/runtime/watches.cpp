@@ -91,23 +91,20 @@ bool Watches::attend(const Path& path, bool renew) {
 }
 
 bool Watches::follow(const Path& path, WatchRoute& route, bool renew) {
-  if (!path->follows(route)) {
-    if (path->prepare(route)) tell_rerouted(path);
-  } else if (!renew && path->up_to_date()) {
-    return true;
-  }
-  bool all_open = true;
+  const bool follows = path->follows(route);
+  if (!follows && path->prepare(route)) tell_rerouted(path);
+  Result<void> all_open;
   for (const WatchRoute::Source& source : route.sources) {
     if (open_.contains(source.group)) continue;
     auto opened = links_.open(source.partition, source.group);
     if (opened) {
       open_.insert(source.group, Clock::now());
-      continue;
+    } else {
+      all_open = std::move(opened);  // its values come only with the answers
     }
-    // Without it values come only with the answers.
-    path->set_health(std::move(opened));
-    all_open = false;
   }
+  if (!all_open) path->set_health(all_open);
+  if (follows && all_open && !renew && path->up_to_date()) return true;
   if (!ask(path, route, path->lacks_history())) return false;
   // Only the first answers show that one edge is ahead of the data of another.
   if (const auto from = path->lacks_history()) {

@@ -6,10 +6,13 @@
 #include <chrono>
 #include <functional>
 #include <future>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -207,6 +210,36 @@ TEST_CASE("creation: a watched path without a reader of values is not healthy, u
     const auto X = watch->latest();
     return X && X->pose.translation().x() == 7;
   }));
+}
+
+TEST_CASE("creation: a watched partition without a reader of values says so, until it has one") {
+  const testing::DomainLease lease;
+  const Options options = options_in(lease);
+  const Node node = Node::open("arm", frames(), options).value();
+  auto client = Client::open(options).value();
+  std::mutex mutex;
+  bool reachable = false;
+  std::string why;
+  const auto take = [&](const PartitionNews& news) {
+    const auto* reach = std::get_if<ReachNews>(&news.what);
+    if (reach == nullptr) return;
+    const std::lock_guard<std::mutex> lock(mutex);
+    reachable = reach->reachable;
+    if (!reachable) why = reach->why;
+  };
+  const auto says = [&](bool wished) {
+    return testing::eventually([&] {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return reachable == wished && (wished || why.find(kStateTopic) != std::string::npos);
+    });
+  };
+  std::optional<PartitionWatch> watch;
+  {
+    const Failing failing(of_topic(kStateTopic));
+    watch = ends([&] { return client.watch_partition("arm", {0, take}); }).value();
+    CHECK(says(false));
+  }
+  CHECK(says(true));
 }
 
 TEST_CASE("creation: an owner that cannot push values ends nevertheless") {
