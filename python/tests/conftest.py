@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import collections.abc
-import contextlib
-import os
-import socket
+import pathlib
+import sys
 
 import pytest
 import tfdude
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests/support"))
+from domain_lease import lease_domain  # noqa: E402
 
 
 @pytest.fixture
@@ -37,12 +39,7 @@ def client(network: tfdude.LoopbackNetwork, node: tfdude.Node) -> collections.ab
 
 @pytest.fixture
 def dds_domain() -> collections.abc.Iterator[int]:
-    """A DDS domain that no other test on this computer uses now; claimed as by tests/support/domain_lease.cpp."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
-        for i in range(200):
-            domain = 20 + (os.getpid() * 7 + i) % 200
-            with contextlib.suppress(OSError):
-                claim.bind(f"\0tfdude-test-domain-{domain}")
-                yield domain
-                return
-    raise RuntimeError("all DDS domains for tests are taken")
+    """A DDS domain that nobody else on this computer uses now."""
+    domain, claim = lease_domain()
+    with claim:
+        yield domain

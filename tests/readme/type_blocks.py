@@ -14,7 +14,6 @@ import re
 import select
 import shutil
 import signal
-import socket
 import struct
 import subprocess
 import sys
@@ -24,6 +23,9 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from domain_lease import lease_domain  # noqa: E402
+
 LINE_SECONDS = 120
 COLUMNS = 80
 COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
@@ -36,19 +38,6 @@ def blocks(text, language):
 
 def lines_of(block):
     return [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
-
-
-def lease_domain():
-    """Reserves a DDS domain, as tests/support/domain_lease.cpp does. It is free again when the socket is closed."""
-    for i in range(200):
-        domain = 20 + (os.getpid() * 7 + i) % 200
-        lease = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lease.bind(f"\0tfdude-test-domain-{domain}")
-            return domain, lease
-        except OSError:
-            lease.close()
-    raise SystemExit("all DDS domains for tests are taken")
 
 
 class Shell:

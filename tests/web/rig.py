@@ -4,13 +4,15 @@ import asyncio
 import json
 import os
 import pathlib
-import socket
 import subprocess
 import sys
 import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/support"))
+from domain_lease import lease_domain  # noqa: E402
+
 BIN = pathlib.Path(os.environ.get("TFDUDE_BIN", ROOT / "build/release/bin"))
 WAIT = 30  # [s], more than a busy machine needs
 
@@ -19,19 +21,6 @@ def skip(why):
     """Ends the test as skipped, for ctest."""
     print("SKIPPED: " + why)
     sys.exit(0)
-
-
-def lease_domain():
-    """@return a domain, and the socket that claims it as tests/support/domain_lease.cpp does."""
-    for i in range(200):
-        domain = 20 + (os.getpid() * 7 + i) % 200
-        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            claim.bind("\0tfdude-test-domain-" + str(domain))
-            return domain, claim
-        except OSError:
-            claim.close()
-    raise RuntimeError("all DDS domains for tests are taken")
 
 
 def eventually(condition, what):
