@@ -46,7 +46,7 @@ function(tfdude_add_tests target)
   endif()
   add_executable(${target} ${ARG_SOURCES})
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
-  target_link_libraries(${target} PRIVATE test_support tfdude_open Catch2::Catch2WithMain tfdude_options
+  target_link_libraries(${target} PRIVATE result_errors test_support tfdude_open Catch2::Catch2WithMain tfdude_options
     ${ARG_LIBRARIES})
   if(ARG_OPTIMIZED)
     tfdude_use_precompiled(OPTIMIZED ${target})

@@ -1,7 +1,10 @@
 """Transforms: their numbers, arrays and operations."""
 
 import gc
+import os
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -227,6 +230,26 @@ def test_equality_and_text():
     assert "covariance='unspecified'" in repr(Transform())
     assert "-0" not in repr(Transform([-0.0, 0, 1], [0, -0.0, 0, 1]))
     assert X.with_covariance(None) == Transform((1, 2, 3))
+
+
+GERMAN = """
+import locale, tfdude
+locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
+assert locale.localeconv()["decimal_point"] == ","
+print(repr(tfdude.Transform((0.5, 1234.5, 0))))
+try:
+    tfdude.Transform((0, 0, 0), (0, 0, 0, 0.5))
+except ValueError as error:
+    print(error)
+"""
+
+
+def test_texts_do_not_follow_the_locale(tmp_path):
+    subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", tmp_path / "de_DE.UTF-8"], check=True)
+    environment = {**os.environ, "LOCPATH": str(tmp_path)}
+    text = subprocess.run([sys.executable, "-c", GERMAN], env=environment, check=True, stdout=subprocess.PIPE, text=True)
+    assert "translation=[0.5, 1234.5, 0]" in text.stdout
+    assert "norm 0.5," in text.stdout
 
 
 def test_errors_can_be_pickled():

@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 struct FirstLookup {
   FirstLookup(const Join& join, const std::string& frame, Milliseconds wait) {
     for (int i = 0; i < 5; ++i) {
-      auto client = *Client::open(join(""));
+      auto client = Client::open(join("")).value();
       const auto start = Clock::now();
       auto found = client.lookup("world", frame, {}, wait);
       took = std::min(took, Clock::now() - start);
@@ -55,10 +55,10 @@ TEST_CASE("bounds: alone in the domain a lookup ends at its maximum wait") {
 }
 
 TEST_CASE("bounds: alone in the domain every call returns a definite answer") {
-  auto client = *Client::open(joined_by(GENERATE(from_range(testing::networks())))(""));
-  CHECK(client.frames()->empty());
-  CHECK(client.partitions()->empty());
-  CHECK(client.roots()->empty());
+  auto client = Client::open(joined_by(GENERATE(from_range(testing::networks())))("")).value();
+  CHECK(client.frames().value().empty());
+  CHECK(client.partitions().value().empty());
+  CHECK(client.roots().value().empty());
   CHECK_FALSE(client.exists("world"));
   CHECK(outcome(client.children("world")) == "unknown_frame");
   CHECK(outcome(client.lookup("world", "tool", {}, 1ms)) == "unknown_start");
@@ -66,7 +66,8 @@ TEST_CASE("bounds: alone in the domain every call returns a definite answer") {
 
 TEST_CASE("bounds: the first lookup of a client ends at its maximum wait") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  const auto node = *Node::open(join("robot"), "robot", {{"world", "", {}}, {"tool", "world", {}}});
+  const auto node =
+      Node::open(join("robot"), "robot", {{"world", "", {}}, {"tool", "world", {}}}).value();
   const FirstLookup there(join, "tool", 20'000ms);
   INFO(there.message);
   CHECK(there.what == "ok");

@@ -62,9 +62,9 @@ std::vector<std::string> structure(Client& client) {
 
 struct Pair {
   explicit Pair(const Join& join)
-      : arms(*Node::open(join("arms"), "arms", {{"arm", "", {}}})),
-        head(*Node::open(join("head"), "head", {{"neck", "", {}}})),
-        client(*Client::open(join(""))) {
+      : arms(Node::open(join("arms"), "arms", {{"arm", "", {}}}).value()),
+        head(Node::open(join("head"), "head", {{"neck", "", {}}}).value()),
+        client(Client::open(join("")).value()) {
     // The owner that started first hears of the other a moment later.
     REQUIRE(agree());
     REQUIRE(client.exists("arm"));
@@ -205,9 +205,9 @@ TEST_CASE("a withdrawn claim takes no frame from others even if the withdrawal a
   testing::LatePages& late = *late_transport;
   Options options;
   options.timeout = Milliseconds(300);
-  const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
-  Node head = *Node::open(std::move(late_transport), "head", {{"neck", "", {}}}, options);
-  Client client = *Client::open(join(""));
+  const Node arms = Node::open(join("arms"), "arms", {{"arm", "", {}}}).value();
+  Node head = Node::open(std::move(late_transport), "head", {{"neck", "", {}}}, options).value();
+  Client client = Client::open(join("")).value();
   REQUIRE(client.exists("neck"));
   late.hold("arms");
   REQUIRE(client.add("camera", "arm", {}));

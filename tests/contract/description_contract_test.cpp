@@ -21,7 +21,7 @@ using testing::outcome;
 Node serving(const Join& join, const std::string& description) {
   Options options;
   options.description = description;
-  return *Node::open(join("arm"), "arm", {{"base", "", {}}}, options);
+  return Node::open(join("arm"), "arm", {{"base", "", {}}}, options).value();
 }
 
 // No two parts of it are equal.
@@ -35,7 +35,7 @@ TEST_CASE("description: others and the owner itself have the whole text") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const std::string text = GENERATE(std::string("<robot/>"), std::string(32768, '<'), long_text());
   Node arm = serving(join, text);
-  Client client = *Client::open(join(""));
+  Client client = Client::open(join("")).value();
   CHECK(client.description("arm").value() == text);
   CHECK(arm.description("arm").value() == text);
   CHECK(outcome(client.description("leg")) == "unknown_partition");
@@ -43,7 +43,7 @@ TEST_CASE("description: others and the owner itself have the whole text") {
 
 TEST_CASE("description: the next process of a partition may have another one, or none") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  Client client = *Client::open(join(""));
+  Client client = Client::open(join("")).value();
   for (const char* text : {"<robot name='a'/>", "", "<robot name='b'/>"}) {
     const Node arm = serving(join, text);
     CHECK(eventually([&] {

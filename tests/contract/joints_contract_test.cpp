@@ -54,16 +54,19 @@ bool comes_true(Condition condition) {
 struct Robot {
   explicit Robot(const Join& join) {
     base.emplace(
-        *Node::open(join("base"), "base",
-                    {{"world", "", {}}, moved_by("turret", "world", revolute_named("turn"))}));
+        Node::open(join("base"), "base",
+                   {{"world", "", {}}, moved_by("turret", "world", revolute_named("turn"))})
+            .value());
     JointSpec elbow = revolute_named("elbow");
     elbow.coupled = true;
-    arm.emplace(*Node::open(join("arm"), "arm",
-                            {moved_by("upper", "turret", revolute_named("shoulder")),
-                             moved_by("fore", "upper", elbow)}));
-    tool.emplace(*Node::open(join("tool"), "tool",
-                             {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))}));
-    client.emplace(*Client::open(join("")));
+    arm.emplace(Node::open(join("arm"), "arm",
+                           {moved_by("upper", "turret", revolute_named("shoulder")),
+                            moved_by("fore", "upper", elbow)})
+                    .value());
+    tool.emplace(Node::open(join("tool"), "tool",
+                            {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))})
+                     .value());
+    client.emplace(Client::open(join("")).value());
   }
   std::optional<Node> base;
   std::optional<Node> arm;
@@ -78,12 +81,13 @@ TEST_CASE("joints: a position without a variance has that of its owner's configu
   elbow.sample_variance = 0.04;
   JointSpec wrist = following("wrist", "elbow", -0.5, 0);
   wrist.sample_variance = 0.01;
-  const Node arm = *Node::open(join("arm"), "arm",
-                               {{"upper", "", {}},
-                                moved_by("fore", "upper", elbow),
-                                moved_by("side", "upper", revolute_named("shoulder"))});
-  const Node tool = *Node::open(join("tool"), "tool", {moved_by("hand", "fore", wrist)});
-  Client client = *Client::open(join(""));
+  const Node arm = Node::open(join("arm"), "arm",
+                              {{"upper", "", {}},
+                               moved_by("fore", "upper", elbow),
+                               moved_by("side", "upper", revolute_named("shoulder"))})
+                       .value();
+  const Node tool = Node::open(join("tool"), "tool", {moved_by("hand", "fore", wrist)}).value();
+  Client client = Client::open(join("")).value();
   const auto variances = [&] {
     const auto of_arm = client.joints("arm");
     const auto of_tool = client.joints("tool");
@@ -122,7 +126,7 @@ TEST_CASE("joints: published positions arrive although the client ends at once")
     INFO("run " << run);
     const double angle = 0.1 * run;
     {
-      auto passing = *Client::open(join(""));
+      auto passing = Client::open(join("")).value();
       REQUIRE(outcome(passing.publish_joints({"turn", "elbow"}, {angle, angle}, {0, 0})) == "ok");
     }
     const auto has_come = [&](const char* a, const char* b, double x) {
@@ -172,7 +176,7 @@ TEST_CASE("joints: an update is visible when the call returns and bad input is r
   CHECK((*joints)[0].outside == 1);
   CHECK((*joints)[0].limits->upper == 2);
   CHECK((*joints)[1].measured == false);
-  CHECK(client.joints("tool")->at(0).mimic->joint == "elbow");
+  CHECK(client.joints("tool").value().at(0).mimic->joint == "elbow");
   CHECK(outcome(client.joints("legs")) == "unknown_partition");
   CHECK(outcome(robot.tool->correlate("hand", {})) == "invalid_input");
 }
@@ -212,20 +216,22 @@ TEST_CASE("joints: between positions far apart all participants see the way of t
   JointSpec wrist = following("wrist", "turn", 2, 0);
   wrist.limits = JointLimits{-6, 6};
   const auto base =
-      *Node::open(join("base"), "base", {{"world", "", {}}, moved_by("turret", "world", turn)});
-  const auto tool = *Node::open(join("tool"), "tool", {moved_by("hand", "turret", wrist)});
-  auto client = *Client::open(join(""));
+      Node::open(join("base"), "base", {{"world", "", {}}, moved_by("turret", "world", turn)})
+          .value();
+  const auto tool = Node::open(join("tool"), "tool", {moved_by("hand", "turret", wrist)}).value();
+  auto client = Client::open(join("")).value();
   WatchOptions composed;
   composed.composed = true;
-  const std::vector<PathWatch> watches{*client.watch("world", "hand"),
-                                       *client.watch("world", "hand", composed)};
+  const std::vector<PathWatch> watches{client.watch("world", "hand").value(),
+                                       client.watch("world", "hand", composed).value()};
   const auto at = [](int milliseconds) { return Time(Milliseconds(milliseconds)); };
   const auto turn_to = [&](double position, int milliseconds) {
     return outcome(client.update_joints({"turn"}, {position}, {4e-4}, at(milliseconds)));
   };
   REQUIRE(turn_to(-2, 1000) == "ok");
   const auto has = [&](const PathWatch& watch, int milliseconds) {
-    return comes_true([&] { return watch.latest() && watch.latest()->stamp == at(milliseconds); });
+    return comes_true(
+        [&] { return watch.latest() && watch.latest().value().stamp == at(milliseconds); });
   };
   for (const PathWatch& watch : watches) REQUIRE(has(watch, 1000));
   REQUIRE(turn_to(2, 2000) == "ok");
@@ -319,8 +325,8 @@ TEST_CASE("joints: a node that is reopened has its stored joint positions") {
   CHECK(joints->at(0).position == 0.75);
   CHECK(joints->at(0).measured);
   CHECK(std::abs(yaw(node->lookup("world", "turret")) - 0.75) < 1e-12);
-  CHECK(std::abs(node->lookup("world", "turret")->covariance.of_specified().stddev()[5] - 0.01) <
-        1e-12);
+  CHECK(std::abs(node->lookup("world", "turret").value().covariance.of_specified().stddev()[5] -
+                 0.01) < 1e-12);
 }
 
 }  // namespace
@@ -334,7 +340,7 @@ TEST_CASE("joints: an owner lists more joints than fit into one reply") {
   }
   const auto owner = Node::open(join("arm"), "arm", frames);
   REQUIRE(owner);
-  auto client = *Client::open(join(""));
+  auto client = Client::open(join("")).value();
   const auto listed = client.joints("arm");
   REQUIRE(listed);
   REQUIRE(listed->size() == kAll);

@@ -41,7 +41,7 @@ class Kept {
     frames_["b"] = {entry(chain, 2), entry(chain, 3)};
     frames_["c"] = {entry(chain, 4)};
     for (const auto& [name, frames] : frames_) start(name, frames);
-    client.emplace(*Client::open(join_("")));
+    client.emplace(Client::open(join_("")).value());
   }
 
   /// @param configured  with its configuration, or with none

@@ -38,7 +38,7 @@ bool comes(Condition condition) {
 
 std::string owner_of(Client& client, const std::string& id) {
   const auto frames = client.frames();
-  for (const Frame& frame : *frames) {
+  for (const Frame& frame : frames.value()) {
     if (frame.id == id) return frame.partition;
   }
   return "nobody";
@@ -46,7 +46,7 @@ std::string owner_of(Client& client, const std::string& id) {
 
 PartitionInfo info_of(Client& client, const std::string& name) {
   const auto partitions = client.partitions();
-  for (const PartitionInfo& one : *partitions) {
+  for (const PartitionInfo& one : partitions.value()) {
     if (one.name == name) return one;
   }
   return {};
@@ -96,8 +96,8 @@ TEST_CASE("of two processes that claim a name at once exactly one serves it") {
 
 TEST_CASE("a stopped partition is reported as stopped and another can take over its frames") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
-  Client client = *Client::open(join(""));
+  Node base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  Client client = Client::open(join("")).value();
   std::mutex mutex;
   std::vector<Change> heard;
   Subscription subscription = client.on_change([&](const Change& change) {
@@ -105,7 +105,7 @@ TEST_CASE("a stopped partition is reported as stopped and another can take over 
     heard.push_back(change);
   });
   {
-    Node arm = *Node::open(join("arm"), "arm", {{"hand", "world", {}}});
+    Node arm = Node::open(join("arm"), "arm", {{"hand", "world", {}}}).value();
     REQUIRE(comes([&] { return owner_of(client, "hand") == "arm"; }));
   }
   REQUIRE(comes([&] { return !info_of(client, "arm").reachable; }));
@@ -114,7 +114,7 @@ TEST_CASE("a stopped partition is reported as stopped and another can take over 
   REQUIRE_FALSE(unreachable);
   CHECK(unreachable.error().code == Errc::kUnreachable);
   CHECK_THAT(unreachable.error().message, testing::ContainsSubstring("it was stopped"));
-  Node left = *Node::open(join("left_arm"), "left_arm", {{"hand", "world", {}}});
+  Node left = Node::open(join("left_arm"), "left_arm", {{"hand", "world", {}}}).value();
   CHECK(comes([&] { return owner_of(client, "hand") == "left_arm"; }));
   CHECK(comes([&] { return owner_of(base, "hand") == "left_arm"; }));
   CHECK(client.lookup("world", "hand"));
@@ -131,10 +131,10 @@ TEST_CASE("a stopped partition is reported as stopped and another can take over 
 
 TEST_CASE("a partition can be forgotten only when it is unreachable and then by all") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  Node base = *Node::open(join("base"), "base", {{"world", "", {}}});
-  Node head = *Node::open(join("head"), "head", {{"neck", "world", {}}});
-  Client client = *Client::open(join(""));
-  std::optional<Node> arm(*Node::open(join("arm"), "arm", {{"hand", "world", {}}}));
+  Node base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  Node head = Node::open(join("head"), "head", {{"neck", "world", {}}}).value();
+  Client client = Client::open(join("")).value();
+  std::optional<Node> arm(Node::open(join("arm"), "arm", {{"hand", "world", {}}}).value());
   REQUIRE(comes([&] { return client.exists("hand"); }));
   REQUIRE(comes([&] { return client.exists("neck"); }));
   const auto refused = client.forget("arm");
@@ -155,7 +155,7 @@ TEST_CASE("a partition can be forgotten only when it is unreachable and then by 
     CHECK(comes([&] { return info_of(*one, "arm").name.empty(); }));
   }
   // After a restart it is as new.
-  arm.emplace(*Node::open(join("arm"), "arm", {{"hand", "world", {}}}));
+  arm.emplace(Node::open(join("arm"), "arm", {{"hand", "world", {}}}).value());
   CHECK(comes([&] { return owner_of(client, "hand") == "arm"; }));
   CHECK(comes([&] { return client.lookup("world", "hand").has_value(); }));
 }

@@ -61,7 +61,8 @@ class Recorded {
       : writer_(*RecordingWriter::create(file, step(0))) {
     for (const char* name : {"base", "arm"}) {
       watches_.push_back(
-          *client.watch_partition(name, {0, [this](const PartitionNews& news) { add(news); }}));
+          client.watch_partition(name, {0, [this](const PartitionNews& news) { add(news); }})
+              .value());
     }
   }
 
@@ -73,7 +74,7 @@ class Recorded {
   // Whether the newest values of all edges have come; structure may come before or after values.
   bool has_all(Client& owner, Client& client) {
     const auto all = owner.frames();
-    if (lines(*all) != lines(*client.frames())) return false;
+    if (lines(all.value()) != lines(client.frames().value())) return false;
     for (const Frame& frame : *all) {
       const auto X = owner.lookup(frame.parent.empty() ? frame.id : frame.parent, frame.id, {});
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -167,15 +168,17 @@ class World {
   World(const Join& join, Random& random) : random_(random) {
     EdgeTiming noisy;
     noisy.process_noise = *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01});
-    base_.emplace(*Node::open(join("base"), "base",
-                              {{"world", "", {}},
-                               {"base", "world", random_.transform()},
-                               {"lift", "base", random_.transform(), noisy}}));
-    arm_.emplace(*Node::open(join("arm"), "arm",
-                             {{"shoulder", "lift", random_.transform()},
-                              {"elbow", "shoulder", random_.transform(), noisy},
-                              {"hand", "elbow", random_.transform()},
-                              moved_by("wrist", "hand", revolute_named("wrist"))}));
+    base_.emplace(Node::open(join("base"), "base",
+                             {{"world", "", {}},
+                              {"base", "world", random_.transform()},
+                              {"lift", "base", random_.transform(), noisy}})
+                      .value());
+    arm_.emplace(Node::open(join("arm"), "arm",
+                            {{"shoulder", "lift", random_.transform()},
+                             {"elbow", "shoulder", random_.transform(), noisy},
+                             {"hand", "elbow", random_.transform()},
+                             moved_by("wrist", "hand", revolute_named("wrist"))})
+                     .value());
   }
 
   // @return the stamp of a late sample of the elbow, if there is one
@@ -253,7 +256,7 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
       const auto late = world.change(number);
       REQUIRE(eventually([&] { return recorded.has_all(world.arm(), *client); }));
       if (late) REQUIRE(eventually([&] { return recorded.has("elbow", *late); }));
-      frames[number] = lines(*client->frames());
+      frames[number] = lines(client->frames().value());
       const std::vector<std::string> names{"world", "lift", "shoulder", "hand", "wrist", "tool"};
       for (int i = 0; i < 8; ++i) {
         const auto& a = names[random.index(names.size())];

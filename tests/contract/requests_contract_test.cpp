@@ -41,13 +41,14 @@ TEST_CASE("a change whose request is lost many times is applied while other thre
   constexpr int kThreads = 3;
   constexpr int kLost =
       8;  // sendings of each request of the unlucky thread, beyond a second in all
-  auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"slow", "arm", {}}}, patient());
+  auto owner =
+      Node::open(join("arms"), "arms", {{"arm", "", {}}, {"slow", "arm", {}}}, patient()).value();
   std::map<std::uint32_t, int> sendings;
   const auto loses = [&sendings](const Request& request) {
     return request.id == "slow" && std::holds_alternative<PartialUpdateRequest>(request.body) &&
            ++sendings[request.sequence] <= kLost;
   };
-  auto client = *Client::open(std::make_unique<LossyRequests>(join(""), loses), patient());
+  auto client = Client::open(std::make_unique<LossyRequests>(join(""), loses), patient()).value();
   REQUIRE(client.exists("slow"));
   std::atomic<bool> done{false};
   std::atomic<int> others{0};
@@ -66,17 +67,17 @@ TEST_CASE("a change whose request is lost many times is applied while other thre
   INFO((updated ? "" : updated.error().message) << ", others " << others);
   CHECK(updated.has_value());
   CHECK(others > 256);
-  CHECK(owner.lookup("arm", "slow")->pose.translation().x() == 5);
+  CHECK(owner.lookup("arm", "slow").value().pose.translation().x() == 5);
 }
 
 TEST_CASE("a frame that its owner has added is not called unknown before its page arrives") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  const Node arms = *Node::open(join("arms"), "arms", {{"arm", "", {}}});
+  const Node arms = Node::open(join("arms"), "arms", {{"arm", "", {}}}).value();
   auto late_transport = std::make_unique<testing::LatePages>(join(""));
   testing::LatePages& late = *late_transport;
   Options options;
   options.timeout = Milliseconds(200);
-  Client client = *Client::open(std::move(late_transport), options);
+  Client client = Client::open(std::move(late_transport), options).value();
   REQUIRE(client.exists("arm"));
   REQUIRE_FALSE(client.exists("hand"));
   late.hold("arms");
@@ -96,9 +97,9 @@ TEST_CASE("a partial update changes the given parts at the owner and keeps the o
   Random random(0x9a75);
   const Transform X_PC = random.transform();
   auto owner =
-      *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", X_PC}}, patient());
-  auto client = *Client::open(join(""), patient());
-  const auto hand = [&] { return *client.lookup("arm", "hand"); };
+      Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", X_PC}}, patient()).value();
+  auto client = Client::open(join(""), patient()).value();
+  const auto hand = [&] { return client.lookup("arm", "hand").value(); };
   const Eigen::Vector3d there(1, 2, 3);
   REQUIRE(client.update_partial({{"hand", {there}}}));
   const Transform placed{*Pose::create(X_PC.pose.rotation(), there), X_PC.covariance};
@@ -116,18 +117,19 @@ TEST_CASE("a partial update changes the given parts at the owner and keeps the o
 
 TEST_CASE("an owner rejects and counts a sample from the future") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  auto owner = *Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", {}}}, patient());
-  auto client = *Client::open(join(""), patient());
+  auto owner =
+      Node::open(join("arms"), "arms", {{"arm", "", {}}, {"hand", "arm", {}}}, patient()).value();
+  auto client = Client::open(join(""), patient()).value();
   const auto refused = client.update("hand", ahead(1), time_of(9'000'000'000'000'000'000));
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == Errc::kInvalidInput);
   CHECK_THAT(refused.error().message, testing::ContainsSubstring("2255-03-14"));
-  REQUIRE(client.history("hand")->size() == 1);
-  CHECK(client.history("hand")->at(0).refused_ahead == 1);
+  REQUIRE(client.history("hand").value().size() == 1);
+  CHECK(client.history("hand").value().at(0).refused_ahead == 1);
   REQUIRE(client.update(
       "hand", ahead(2),
       std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now())));
-  CHECK(client.lookup("arm", "hand")->pose.translation().x() == 2);
+  CHECK(client.lookup("arm", "hand").value().pose.translation().x() == 2);
 }
 
 }  // namespace tfdude

@@ -69,8 +69,8 @@ struct Loop {
 
 TEST_CASE("streams: an edge is followed from owner to owner and no call waits") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
-  auto client = *Client::open(join(""));
-  Loop loop{*client.stream({"gone_tip", "a_tip"}), {}};
+  auto client = Client::open(join("")).value();
+  Loop loop{client.stream({"gone_tip", "a_tip"}).value(), {}};
   CHECK(loop.send({1, 1}) == "0 unknown_frame, 1 unknown_frame");
   Node a = open_with_tip(join, "a");
   CHECK(eventually([&] { return loop.send({2, 2}) == "0 unknown_frame"; }));
@@ -106,7 +106,7 @@ TEST_CASE("streams: all edges of a sample get the stamp of the source") {
   Node b = open_with_tip(join, "b");
   REQUIRE(eventually([&] { return b.exists("a_tip"); }));
   // One edge of another owner and one of its own.
-  auto stream = *b.stream({"a_tip", "b_tip"});
+  auto stream = b.stream({"a_tip", "b_tip"}).value();
   auto stamp = std::chrono::time_point_cast<Time::duration>(std::chrono::system_clock::now());
   REQUIRE(eventually([&] {
     stamp += Milliseconds(1);
@@ -125,8 +125,8 @@ TEST_CASE("streams: all edges of a sample get the stamp of the source") {
 TEST_CASE("streams: nothing of a sample is sent if one value is invalid") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
-  auto client = *Client::open(join(""));
-  auto stream = *client.stream({"a_tip", "a_base"});
+  auto client = Client::open(join("")).value();
+  auto stream = client.stream({"a_tip", "a_base"}).value();
   REQUIRE(eventually([&] { return stream.try_publish({along_x(1), along_x(1)}).empty(); }));
   REQUIRE(eventually([&] { return is_at(a, "a_base", "a_tip", 1); }));
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -139,21 +139,24 @@ TEST_CASE("streams: nothing of a sample is sent if one value is invalid") {
   CHECK(outcome(client.stream({""})) == "invalid_input");
   CHECK(outcome(client.stream_joints(std::vector<std::string>(kMaxItems + 1, "j"))) ==
         "invalid_input");
-  CHECK(client.stream({})->try_publish({}).empty());
+  CHECK(client.stream({}).value().try_publish({}).empty());
 }
 
 TEST_CASE("streams: joint positions reach all owners and missing ones are named") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   JointSpec elbow = revolute_named("elbow");
   elbow.coupled = true;
-  Node arm = *Node::open(join("arm"), "arm",
-                         {{"world", "", {}},
-                          moved_by("upper", "world", revolute_named("shoulder")),
-                          moved_by("fore", "upper", elbow)});
-  std::optional<Node> tool = *Node::open(
-      join("tool"), "tool", {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))});
-  auto client = *Client::open(join(""));
-  auto stream = *client.stream_joints({"shoulder", "elbow", "knee"});
+  Node arm = Node::open(join("arm"), "arm",
+                        {{"world", "", {}},
+                         moved_by("upper", "world", revolute_named("shoulder")),
+                         moved_by("fore", "upper", elbow)})
+                 .value();
+  std::optional<Node> tool =
+      Node::open(join("tool"), "tool",
+                 {moved_by("hand", "fore", following("wrist", "elbow", -1, 0))})
+          .value();
+  auto client = Client::open(join("")).value();
+  auto stream = client.stream_joints({"shoulder", "elbow", "knee"}).value();
   const auto send = [&](double shoulder, double elbow_position) {
     return text(stream.try_publish({shoulder, elbow_position, 0}, {0, 1e-4, 0}));
   };
@@ -170,7 +173,7 @@ TEST_CASE("streams: joint positions reach all owners and missing ones are named"
   REQUIRE(eventually([&] { return send(0.3, 0.4) == "2 unknown_joint, 1 unreachable tool"; }));
   CHECK(eventually([&] { return std::abs(yaw(arm.lookup("upper", "fore")) - 0.4) < 1e-12; }));
   // The owner itself.
-  auto own = *arm.stream_joints({"shoulder"});
+  auto own = arm.stream_joints({"shoulder"}).value();
   CHECK(eventually([&] { return text(own.try_publish({0.5}, {0})) == "all sent"; }));
   CHECK(std::abs(yaw(arm.lookup("world", "upper")) - 0.5) < 1e-12);
 }
@@ -215,8 +218,8 @@ TEST_CASE("streams: a joint of two partitions is not moved until its name says w
 TEST_CASE("streams: a stream that outlives its client sends nothing") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node a = open_with_tip(join, "a");
-  std::optional<Client> client = *Client::open(join(""));
-  auto stream = *client->stream({"a_tip"});
+  std::optional<Client> client = Client::open(join("")).value();
+  auto stream = client->stream({"a_tip"}).value();
   REQUIRE(eventually([&] { return stream.try_publish({along_x(1)}).empty(); }));
   client.reset();
   CHECK(text(stream.try_publish({along_x(2)})) == "0 transport");

@@ -40,11 +40,13 @@ struct Robot {
       *X = random.transform(1.0, size, size);
     }
     base.emplace(
-        *Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", X_world_base}}));
-    arm.emplace(*Node::open(join("arm"), "arm",
-                            {{"arm", "base", X_base_arm}, {"hand", "arm", X_arm_hand}}));
-    tool.emplace(*Node::open(join("tool"), "tool", {{"tool", "hand", X_hand_tool}}));
-    client.emplace(*Client::open(join("")));
+        Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", X_world_base}})
+            .value());
+    arm.emplace(
+        Node::open(join("arm"), "arm", {{"arm", "base", X_base_arm}, {"hand", "arm", X_arm_hand}})
+            .value());
+    tool.emplace(Node::open(join("tool"), "tool", {{"tool", "hand", X_hand_tool}}).value());
+    client.emplace(Client::open(join("")).value());
   }
   Transform X_world_base;
   Transform X_base_arm;
@@ -262,7 +264,7 @@ TEST_CASE("uncertainty: a measurement that the gate rejects changes nothing and 
   CHECK(consistency->at(0).observations == 2);
   CHECK(consistency->at(0).refused == 1);
   CHECK(consistency->at(0).sum.squares > consistency->at(0).sum.expected);
-  CHECK(robot.client->consistency("base")->size() == 1);
+  CHECK(robot.client->consistency("base").value().size() == 1);
   CHECK_FALSE(robot.client->consistency("nobody"));
 }
 

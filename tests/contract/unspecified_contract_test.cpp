@@ -42,12 +42,14 @@ struct Robot {
         hand(unspecified(random.pose())) {
     Options options;
     options.state = state;
-    robot.emplace(*Node::open(join("robot"), "robot",
-                              {{"world", "", {}}, {"odom", "world", odom}, {"base", "odom", base}},
-                              options));
+    robot.emplace(Node::open(join("robot"), "robot",
+                             {{"world", "", {}}, {"odom", "world", odom}, {"base", "odom", base}},
+                             options)
+                      .value());
     arms.emplace(
-        *Node::open(join("arms"), "arms", {{"arm", "base", arm}, {"hand", "arm", hand}}, options));
-    client.emplace(*Client::open(join("")));
+        Node::open(join("arms"), "arms", {{"arm", "base", arm}, {"hand", "arm", hand}}, options)
+            .value());
+    client.emplace(Client::open(join("")).value());
   }
   // The path from the world to the hand, as if edges without covariance were exact.
   [[nodiscard]] Transform to_hand() const {
@@ -81,8 +83,8 @@ TEST_CASE(
   for (Client* who : {&*robot.client, static_cast<Client*>(&*robot.robot)}) {
     const auto X = who->lookup("world", "hand", Query{});
     CHECK(unspecified_of(X) == Names{"odom", "hand"});
-    CHECK(transform_diff(*X, robot.to_hand(), 1e-12) == "");
-    CHECK_FALSE(who->lookup("world", "hand")->covariance.complete());
+    CHECK(transform_diff(X.value(), robot.to_hand(), 1e-12) == "");
+    CHECK_FALSE(who->lookup("world", "hand").value().covariance.complete());
     CHECK(unspecified_of(who->lookup("hand", "world", Query{})) == Names{"hand", "odom"});
     CHECK(unspecified_of(who->lookup("odom", "arm", Query{})).empty());
     const auto fixed = who->lookup("hand", {}, "arm", {}, "world");
@@ -116,7 +118,10 @@ TEST_CASE("unspecified: covariances are taken away and given by each kind of req
   REQUIRE(client.move("tool", "arm", {{}, {}, StatedCovariance::exact()}));
   CHECK(is_complete("arm", "tool"));
   REQUIRE(client.publish({{"tool", unspecified(random.pose())}}));
-  CHECK(eventually([&] { return !client.lookup("arm", "tool")->covariance.complete(); }));
+  CHECK(eventually([&] {
+    const auto X = client.lookup("arm", "tool");
+    return X && !X->covariance.complete();
+  }));
 }
 
 TEST_CASE("unspecified: a watched path shows it, also between samples") {
@@ -127,7 +132,7 @@ TEST_CASE("unspecified: a watched path shows it, also between samples") {
   const auto path = robot.client->watch("world", "hand");
   REQUIRE(path);
   CHECK(unspecified_of(path->latest()) == Names{"odom", "hand"});
-  CHECK(transform_diff(*path->latest(), robot.to_hand(), 1e-12) == "");
+  CHECK(transform_diff(path->latest().value(), robot.to_hand(), 1e-12) == "");
   REQUIRE(robot.arms->update("hand", random.transform(), ms(1000)));
   CHECK(eventually([&] { return unspecified_of(path->latest()) == Names{"odom"}; }));
   REQUIRE(robot.arms->update("hand", unspecified(random.pose()), ms(1100)));
@@ -152,7 +157,7 @@ TEST_CASE("unspecified: a segment that is pushed composed counts as a whole") {
   const auto path = robot.client->watch("odom", "hand", options);
   REQUIRE(path);
   CHECK(unspecified_of(path->latest()) == Names{"hand"});
-  CHECK(path->latest()->covariance.of_specified().upper() != Covariance::Upper{});
+  CHECK(path->latest().value().covariance.of_specified().upper() != Covariance::Upper{});
   REQUIRE(robot.arms->update("hand", random.transform()));
   CHECK(eventually([&] { return unspecified_of(path->latest()).empty(); }));
 }
@@ -174,16 +179,17 @@ TEST_CASE("unspecified: an observed edge takes what the measurement says") {
   CHECK(observed->dimensions == 0);
   const auto after = client.lookup("world", "arm", Query{});
   CHECK(unspecified_of(after).empty());
-  CHECK(transform_diff(*after, Z, 1e-9, 1e-3) == "");
+  CHECK(transform_diff(after.value(), Z, 1e-9, 1e-3) == "");
   // A second measurement weighs both.
   const auto again = client.observe("world", "arm", Z);
   REQUIRE(again);
   CHECK(again->dimensions == 6);
   const double once = after->covariance.of_specified().matrix().trace();
-  CHECK(client.lookup("world", "arm")->covariance.of_specified().matrix().trace() < 0.6 * once);
+  CHECK(client.lookup("world", "arm").value().covariance.of_specified().matrix().trace() <
+        0.6 * once);
   const auto fused = client.fuse("hand", Z);
   REQUIRE(fused);
-  CHECK(transform_diff(*client.lookup("arm", "hand"), Z, 1e-9) == "");
+  CHECK(transform_diff(client.lookup("arm", "hand").value(), Z, 1e-9) == "");
 }
 
 TEST_CASE("unspecified: a restarted owner still says so") {

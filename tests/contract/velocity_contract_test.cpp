@@ -34,11 +34,12 @@ Covariance isotropic(double metres, double radians) {
 struct Robot {
   explicit Robot(const Join& join, const Covariance& base_error = {},
                  const Covariance& hand_error = {}) {
-    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
-    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", {}}}));
+    base.emplace(
+        Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}).value());
+    arm.emplace(Node::open(join("arm"), "arm", {{"arm", "base", {}}}).value());
     const Transform X_AH{along_x(0.5).pose, hand_error};
-    hand.emplace(*Node::open(join("hand"), "hand", {{"hand", "arm", X_AH}}));
-    client.emplace(*Client::open(join("")));
+    hand.emplace(Node::open(join("hand"), "hand", {{"hand", "arm", X_AH}}).value());
+    client.emplace(Client::open(join("")).value());
     for (int t = 1000; t <= 2000; t += 10) {
       const double s = 1e-3 * t;
       const Eigen::Quaterniond q(Eigen::AngleAxisd(2 * (s - 1), Eigen::Vector3d::UnitZ()));

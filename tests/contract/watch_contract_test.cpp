@@ -47,11 +47,11 @@ struct Robot {
   explicit Robot(Join joined, const EdgeTiming& of_hand = {}) : join(std::move(joined)) {
     const Transform exact = Transform::exact({});
     base.emplace(
-        *Node::open(join("base"), "base", {{"world", "", exact}, {"base", "world", exact}}));
+        Node::open(join("base"), "base", {{"world", "", exact}, {"base", "world", exact}}).value());
     FrameSpec hand{"hand", "arm", exact};
     hand.timing = of_hand;
-    arm.emplace(*Node::open(join("arm"), "arm", {{"arm", "base", exact}, hand}));
-    client.emplace(*Client::open(join("")));
+    arm.emplace(Node::open(join("arm"), "arm", {{"arm", "base", exact}, hand}).value());
+    client.emplace(Client::open(join("")).value());
   }
   Join join;
   std::optional<Node> base;
@@ -122,7 +122,7 @@ TEST_CASE("watch: late samples and process noise give the same values as a looku
   REQUIRE(path);
   // Waits for discovery first.
   REQUIRE(robot.arm->update("hand", random.transform(), ms(1000)));
-  REQUIRE(eventually([&] { return path->latest() && path->latest()->stamp == ms(1000); }));
+  REQUIRE(eventually([&] { return path->latest() && path->latest().value().stamp == ms(1000); }));
   for (const int t : {3000, 2000, 4000, 1500, 3990}) {
     REQUIRE(robot.arm->update("hand", random.transform(), ms(t)));
   }
@@ -152,7 +152,8 @@ TEST_CASE("watch: late samples and static edges change composed segments as they
     REQUIRE(robot.arm->update("hand", random.transform(), ms(t)));
     // From here on all is pushed.
     if (t == 1000) {
-      REQUIRE(eventually([&] { return path->latest() && path->latest()->stamp == ms(1000); }));
+      REQUIRE(
+          eventually([&] { return path->latest() && path->latest().value().stamp == ms(1000); }));
     }
   }
   const auto agree = [&] {
@@ -205,7 +206,7 @@ TEST_CASE("watch: a new watch starts at the latest common time of its edges") {
     REQUIRE(path);
     const auto found = path->latest();
     CHECK(outcome(found) == "ok");
-    CHECK(found->stamp == ms(10 * t - 7));
+    CHECK(found.value().stamp == ms(10 * t - 7));
   }
   // There is none yet where an edge has only just begun: it is waited for.
   REQUIRE(robot.base->add("new", "base", {}));
@@ -243,7 +244,7 @@ TEST_CASE("watch: a path is read without a break while an owner restarts") {
   });
   robot.arm.reset();
   robot.arm.emplace(
-      *Node::open(join("arm"), "arm", {{"arm", "base", {}}, {"hand", "arm", along_x(7)}}));
+      Node::open(join("arm"), "arm", {{"arm", "base", {}}, {"hand", "arm", along_x(7)}}).value());
   CHECK(eventually([&] { return x_of(path->latest()) == 7; }));
   stop = true;
   reader.join();
@@ -267,9 +268,10 @@ TEST_CASE("watch: an invalid rate is rejected") {
 // Not more, because each costs milliseconds; pusher_test.cpp has 1,000 watches.
 TEST_CASE("watch: no writer is left after watches and clients have ended") {
   CountedDomain domain;
-  auto base = *Node::open(domain.join("base", true), "base",
-                          {{"world", "", {}}, {"base", "world", {}}, {"spare", "world", {}}});
-  auto client = *Client::open(domain.join(""));
+  auto base = Node::open(domain.join("base", true), "base",
+                         {{"world", "", {}}, {"base", "world", {}}, {"spare", "world", {}}})
+                  .value();
+  auto client = Client::open(domain.join("")).value();
   REQUIRE(client.lookup("world", "base"));
   REQUIRE(eventually([&] { return domain.writers() == 3; }));  // one of them for replies
   const std::uint64_t before = domain.writers();
@@ -286,7 +288,7 @@ TEST_CASE("watch: no writer is left after watches and clients have ended") {
     REQUIRE(base.add("spare", "world", {}));
   }
   for (int i = 0; i < 50; ++i) {
-    auto passing = *Client::open(domain.join(""));
+    auto passing = Client::open(domain.join("")).value();
     REQUIRE(passing.watch("world", "base", one_more()));
   }
   CHECK(eventually([&] { return domain.writers() == before; }));

@@ -32,12 +32,14 @@ double x_of(const Result<StampedTransform>& X) {
 // A fan of fingers, of one partition, on a base of another.
 struct Hand {
   explicit Hand(Join joined) : join(std::move(joined)) {
-    base.emplace(*Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}));
-    hand.emplace(*Node::open(join("hand"), "hand",
-                             {{"hand", "base", along_x(1)},
-                              {"left", "hand", along_x(2)},
-                              {"right", "hand", along_x(3)}}));
-    client.emplace(*Client::open(join("")));
+    base.emplace(
+        Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", {}}}).value());
+    hand.emplace(Node::open(join("hand"), "hand",
+                            {{"hand", "base", along_x(1)},
+                             {"left", "hand", along_x(2)},
+                             {"right", "hand", along_x(3)}})
+                     .value());
+    client.emplace(Client::open(join("")).value());
   }
   Join join;
   std::optional<Node> base;
@@ -54,7 +56,7 @@ TEST_CASE("watched edges: edges beside each other are pushed, and composed here"
   CHECK(x_of(edges->lookup("hand", "left")) == 2);
   CHECK(x_of(edges->lookup("left", "right")) == 1);
   CHECK(x_of(edges->lookup("base", "right")) == 4);
-  CHECK(!edges->lookup("base", "right")->stamp);
+  CHECK(!edges->lookup("base", "right").value().stamp);
   CHECK(outcome(edges->lookup("base", "world")) == "unknown_end");
   CHECK(edges->health());
 
@@ -63,7 +65,7 @@ TEST_CASE("watched edges: edges beside each other are pushed, and composed here"
   CHECK(edges->wait_for_more(before, testing::in_time()));
   REQUIRE(eventually([&] { return x_of(edges->lookup("hand", "left")) == 5; }));
   CHECK(x_of(edges->lookup("hand", "right")) == 6);
-  CHECK(edges->lookup("hand", "right")->stamp == ms(1000));
+  CHECK(edges->lookup("hand", "right").value().stamp == ms(1000));
 }
 
 TEST_CASE("watched edges: a moved edge is followed, and a removed one is named") {

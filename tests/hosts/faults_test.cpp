@@ -38,7 +38,7 @@ TEST_CASE("hosts: calls are answered while packets are lost in both directions")
   if (testing::skip_without_hosts()) return;
   RobotHosts r(false);
   r.start_daemons();
-  auto client = *Client::open(r.options());
+  auto client = Client::open(r.options()).value();
   REQUIRE(eventually([&] { return structure_diff(client, r.oracle).empty(); }));
   for (const int loss : {0, 2, 10}) {
     const auto lost_before = r.hosts.lost();
@@ -68,7 +68,7 @@ TEST_CASE("hosts: replicas become equal again after a link was cut") {
   RobotHosts r(by_server);
   if (by_server) r.start_server();
   r.start_daemons();
-  auto near = *Client::open(r.options());
+  auto near = Client::open(r.options()).value();
   auto far = r.open_client(RobotHosts::kArms);
   for (Client* client : {&near, &far}) {
     REQUIRE(eventually([&] { return structure_diff(*client, r.oracle).empty(); }));

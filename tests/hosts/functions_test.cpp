@@ -29,7 +29,7 @@ TEST_CASE("hosts: a client on a fourth host uses the frames of three others") {
   RobotHosts r(by_server);
   if (by_server) r.start_server();
   r.start_daemons();
-  auto client = *Client::open(r.options());
+  auto client = Client::open(r.options()).value();
   auto witness = r.open_client(RobotHosts::kArms);
   check_agreement(r, client);
   const auto path = client.path("world", "tool");
@@ -67,7 +67,7 @@ TEST_CASE("hosts: a discovery server may start late and restart") {
   if (testing::skip_without_hosts()) return;
   RobotHosts r(true);
   r.start_daemons();
-  auto early = *Client::open(r.options());
+  auto early = Client::open(r.options()).value();
   r.start_server_again();
   check_agreement(r, early);
   r.end_server();

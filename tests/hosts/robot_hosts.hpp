@@ -87,7 +87,7 @@ class RobotHosts {
   }
 
   [[nodiscard]] Client open_client(std::size_t host) const {
-    return hosts.on(host, [this] { return *Client::open(options()); });
+    return hosts.on(host, [this] { return Client::open(options()).value(); });
   }
 
   Hosts hosts{kServer + 1};

@@ -28,7 +28,7 @@ using testing::x_of;
 
 std::string owner_of(Client& client, const std::string& id) {
   const auto frames = client.frames();
-  for (const Frame& frame : *frames) {
+  for (const Frame& frame : frames.value()) {
     if (frame.id == id) return frame.partition;
   }
   return "nobody";
@@ -71,7 +71,7 @@ TEST_CASE("absences: another daemon owns the frames of a dead one within three s
   auto least = Clock::duration::max();
   for (int attempt = 0; attempt < 3 && least > std::chrono::seconds(3); ++attempt) {
     Robot robot;
-    auto client = *Client::open(robot.domain.options());
+    auto client = Client::open(robot.domain.options()).value();
     REQUIRE(client.lookup("world", "hand"));
     const auto death = Clock::now();
     robot.arm->kill();
@@ -84,7 +84,7 @@ TEST_CASE("absences: another daemon owns the frames of a dead one within three s
 
 TEST_CASE("absences: a daemon keeps the frames that it took over when their first owner returns") {
   Robot robot;
-  auto client = *Client::open(robot.domain.options());
+  auto client = Client::open(robot.domain.options()).value();
   REQUIRE(client.lookup("world", "hand"));
   std::mutex mutex;
   std::vector<Change> heard;
@@ -128,14 +128,14 @@ TEST_CASE("absences: a daemon keeps the frames that it took over when their firs
   const auto X = client.lookup("world", "tool");
   REQUIRE(X);
   CHECK(x_of(X) == 83);
-  auto late = *Client::open(robot.domain.options());
+  auto late = Client::open(robot.domain.options()).value();
   CHECK(late.exists("tool"));
   CHECK(owner_of(late, "hand") == "left_arm");
 }
 
 TEST_CASE("absences: a daemon that hung yields its frames to the one that took them over") {
   Robot robot;
-  auto client = *Client::open(robot.domain.options());
+  auto client = Client::open(robot.domain.options()).value();
   REQUIRE(client.lookup("world", "hand"));
   robot.arm->freeze();
   robot.left.emplace(robot.start(robot.left_config));
@@ -144,7 +144,7 @@ TEST_CASE("absences: a daemon that hung yields its frames to the one that took t
   robot.arm->signal(SIGCONT);
   REQUIRE(eventually([&] {
     const auto partitions = client.partitions();
-    for (const PartitionInfo& one : *partitions) {
+    for (const PartitionInfo& one : partitions.value()) {
       if (one.name == "arm") return one.reachable && one.frames == 0;
     }
     return false;
@@ -158,13 +158,13 @@ TEST_CASE("absences: a daemon that was away learns that a partition was forgotte
   const auto refused = robot.domain.cli({"forget", "arm"});
   CHECK(refused.status != 0);
   CHECK_THAT(refused.err, ContainsSubstring("partition 'arm' is reachable"));
-  auto client = *Client::open(robot.domain.options());
+  auto client = Client::open(robot.domain.options()).value();
   REQUIRE(client.exists("hand"));
   const std::string head_config = robot.directory.write(
       "head.yaml", "partition: head\nframes:\n  - {id: neck, parent: world}\n");
   Process head = robot.start(head_config);
   robot.arm->kill();
-  REQUIRE(eventually([&] { return !(*client.partitions())[0].reachable; }));
+  REQUIRE(eventually([&] { return !(client.partitions().value())[0].reachable; }));
   head.kill();
   // Until the base misses the head, a command cannot know whether it has discovered all.
   REQUIRE(eventually([&] { return robot.domain.cli({"forget", "arm"}).status == 0; }));
@@ -183,7 +183,7 @@ TEST_CASE("absences: a daemon is accepted although its clock is behind that of i
     return;
   }
   Robot robot;
-  auto client = *Client::open(robot.domain.options());
+  auto client = Client::open(robot.domain.options()).value();
   REQUIRE(client.lookup("world", "hand"));
   robot.arm->kill();
   const std::string state =

@@ -77,8 +77,8 @@ class Count final : public fastdds::edds::LogConsumer {
 TEST_CASE("beside: each client of a process has the sockets of its own profile") {
   const testing::DomainLease lease;
   const bool confined_first = GENERATE(true, false);
-  const auto open_confined = [&] { return *Client::open(options_of(lease.number())); };
-  const auto open_wide = [&] { return *Client::open(options_of(lease.number(), "")); };
+  const auto open_confined = [&] { return Client::open(options_of(lease.number())).value(); };
+  const auto open_wide = [&] { return Client::open(options_of(lease.number(), "")).value(); };
   const Sockets before = own_sockets();
   std::multiset<std::string> confined;
   std::multiset<std::string> wide;
@@ -107,14 +107,14 @@ TEST_CASE("beside: an edited profile file is read again") {
   std::stringstream text;
   text << std::ifstream(TFDUDE_LOOPBACK_PROFILE).rdbuf();
   std::ofstream(file) << text.str();
-  const Client first = *Client::open(options_of(lease.number(), file));
+  const Client first = Client::open(options_of(lease.number(), file)).value();
   const std::string confinement =
       "<interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>";
   const auto at = text.str().find(confinement);
   REQUIRE(at != std::string::npos);
   std::ofstream(file) << text.str().erase(at, confinement.size());
   const Sockets between = own_sockets();
-  const Client second = *Client::open(options_of(lease.number(), file));
+  const Client second = Client::open(options_of(lease.number(), file)).value();
   CHECK(addresses_since(between).count(kAnyAddress) > 0);
 }
 
@@ -125,7 +125,7 @@ TEST_CASE("beside: a client keeps the process's log consumers and intraprocess d
   fastdds::edds::Log::RegisterConsumer(std::make_unique<Count>(entries));
   testing::set_intraprocess(testing::kIntraprocessUserData);
   {
-    const Client client = *Client::open(options_of(lease.number()));
+    const Client client = Client::open(options_of(lease.number())).value();
     EPROSIMA_LOG_ERROR(TFDUDE_TEST, "said by the host");
     CHECK(eventually([&] { return *entries > 0; }));
     CHECK(testing::intraprocess() == testing::kIntraprocessUserData);
@@ -140,9 +140,11 @@ TEST_CASE("beside: two nodes of one process call each other with any intraproces
   testing::set_intraprocess(delivery);
   const testing::DomainLease lease;
   auto arm =
-      *Node::open("arm", {{"world", "", {}}, {"arm", "world", {}}}, options_of(lease.number()));
+      Node::open("arm", {{"world", "", {}}, {"arm", "world", {}}}, options_of(lease.number()))
+          .value();
   auto leg =
-      *Node::open("leg", {{"hip", "world", {}}, {"leg", "hip", {}}}, options_of(lease.number()));
+      Node::open("leg", {{"hip", "world", {}}, {"leg", "hip", {}}}, options_of(lease.number()))
+          .value();
   REQUIRE(eventually([&] { return arm.lookup("world", "leg") && leg.lookup("world", "arm"); }));
   auto by_arm = std::async(std::launch::async, [&] { return asks(arm, "arm", "leg"); });
   auto by_leg = std::async(std::launch::async, [&] { return asks(leg, "leg", "arm"); });

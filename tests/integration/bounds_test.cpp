@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 
 TEST_CASE("bounds: a lookup ends at its maximum wait although a daemon hangs") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.lookup("world", "hand_left"));
   // Some before the daemon counts as lost, and some after.
   const std::vector<std::chrono::milliseconds> waits{50ms, 50ms, 200ms, 500ms, 50ms};
@@ -53,7 +53,7 @@ TEST_CASE("bounds: a lookup ends at its maximum wait although a daemon hangs") {
 
 TEST_CASE("bounds: a flush names the daemon that hangs and has not acknowledged") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   const std::vector<EdgeUpdate> edge{{"hand_left", testing::along_x(1)}};
   REQUIRE(client.publish(edge));
   REQUIRE(client.flush(20'000ms));
@@ -110,7 +110,7 @@ TEST_CASE("bounds: neither a flush nor the end of a client waits for a process t
 
 TEST_CASE("bounds: no flush succeeds while another one still waits for an acknowledgement") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.publish({{"hand_left", testing::along_x(1)}}));
   REQUIRE(client.flush(20'000ms));
   d.arms->freeze();
@@ -134,7 +134,7 @@ TEST_CASE("bounds: a client that has streamed to a hanging daemon still ends") {
     options.linger = 10s;
     options.timeout = 150ms;
   }
-  std::optional<Client> client = *Client::open(options);
+  std::optional<Client> client = Client::open(options).value();
   const auto publish = [&] {
     return client->publish({{"hand_left", testing::along_x(1)}}).has_value();
   };
@@ -152,7 +152,7 @@ TEST_CASE("bounds: a client that has streamed to a hanging daemon still ends") {
 
 TEST_CASE("bounds: a lookup without a limit succeeds when the daemon resumes") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->freeze();
   auto pending = client.lookup_async("world", "hand_left", {}, Milliseconds::max());

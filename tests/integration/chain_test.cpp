@@ -39,9 +39,10 @@ struct Five {
       const auto config = directory.write(partition.name + ".yaml", partition.yaml());
       daemons.push_back(domain.start_daemon({"--config", config}));
     }
-    node.emplace(*Node::open(partitions[here].name, partitions[here].frames, domain.options()));
+    node.emplace(
+        Node::open(partitions[here].name, partitions[here].frames, domain.options()).value());
     for (Process& daemon : daemons) testing::await_ready(daemon);
-    client.emplace(*Client::open(domain.options()));
+    client.emplace(Client::open(domain.options()).value());
     await_agreement();
   }
 
@@ -170,7 +171,7 @@ TEST_CASE("five: a removal in the middle empties partitions below and they can b
   five.oracle.remove(removed);
   five.await_agreement();
   five.check_all();
-  CHECK(five.client->partitions()->size() == 5);
+  CHECK(five.client->partitions().value().size() == 5);
   const auto partitions = five.client->partitions().value();
   for (const PartitionInfo& partition : partitions) CHECK(partition.reachable);
   for (Process& daemon : five.daemons) CHECK(daemon.runs());

@@ -62,7 +62,7 @@ TEST_CASE("churn: fifty daemons and clients come and go under load without an er
   testing::Random random(50);
   INFO("seed " << random.seed());
   testing::ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.lookup("camera", "hand_left"));
   testing::TemporaryDirectory directory;
   Load load(client);

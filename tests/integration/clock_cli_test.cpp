@@ -32,7 +32,7 @@ using testing::TestDomain;
 class Simulator {
  public:
   explicit Simulator(const TestDomain& domain)
-      : client_(*Client::open(domain.options())), thread_([this] { run(); }) {}
+      : client_(Client::open(domain.options()).value()), thread_([this] { run(); }) {}
   ~Simulator() {
     stop_ = true;
     thread_.join();

@@ -27,7 +27,7 @@ using testing::ThesisDaemons;
 TEST_CASE("events: the command line prints each change as one line") {
   ThesisDaemons d;
   Process events = d.domain.start_cli({"--json", "events"});
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.exists("hand_left"));
   // Repeats a change until the command prints it: only then does it listen.
   REQUIRE(eventually([&] {
@@ -75,10 +75,10 @@ TEST_CASE("events: commands that run until interrupted say that no partition ans
 
 TEST_CASE("events: a daemon whose name was taken while it hung ends and names its successor") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   REQUIRE(client.exists("hand_left"));
   d.arms->freeze();
-  REQUIRE(eventually([&] { return !client.partitions()->at(0).reachable; }));
+  REQUIRE(eventually([&] { return !client.partitions().value().at(0).reachable; }));
   Process successor = d.domain.serve(kArmsFile);
   d.arms->signal(SIGCONT);
   const auto result = finish(*d.arms);
@@ -88,7 +88,7 @@ TEST_CASE("events: a daemon whose name was taken while it hung ends and names it
   CHECK_THAT(result.err, ContainsSubstring("because process " + std::to_string(d.arms->pid())));
   CHECK(successor.runs());
   CHECK(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
-  CHECK(client.partitions()->at(0).pid == static_cast<std::uint32_t>(successor.pid()));
+  CHECK(client.partitions().value().at(0).pid == static_cast<std::uint32_t>(successor.pid()));
 }
 
 }  // namespace tfdude

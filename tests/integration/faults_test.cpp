@@ -58,7 +58,7 @@ std::string host() {
 
 TEST_CASE("faults: calls that need a killed daemon fail early and others succeed") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options(kPatience));
+  auto client = Client::open(d.domain.options(kPatience)).value();
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->kill();
   check_arms_missing(client);
@@ -73,10 +73,10 @@ TEST_CASE("faults: calls that need a killed daemon fail early and others succeed
 TEST_CASE("faults: a client that joins after a daemon was killed learns that it is unreachable") {
   ThesisDaemons d;
   d.arms->kill();
-  auto joiner = *Client::open(d.domain.options(kPatience));
+  auto joiner = Client::open(d.domain.options(kPatience)).value();
   // It may come before the other daemon has noticed.
-  REQUIRE(eventually([&] { return joiner.partitions()->size() == 2; }));
-  CHECK_FALSE(joiner.partitions()->at(0).reachable);
+  REQUIRE(eventually([&] { return joiner.partitions().value().size() == 2; }));
+  CHECK_FALSE(joiner.partitions().value().at(0).reachable);
   check_arms_missing(joiner);
 }
 
@@ -91,7 +91,7 @@ TEST_CASE("faults: a longer lease in the profile delays the loss of a daemon") {
   options.profile = directory.write("two_seconds.xml", text);
   Process arms = domain.start_daemon({"--config", kArmsFile, "--profile", options.profile});
   testing::await_ready(arms);
-  auto client = *Client::open(options);
+  auto client = Client::open(options).value();
   REQUIRE(eventually([&] { return client.lookup("arm_1", "hand_left").has_value(); }));
   arms.kill();
   const auto killed = testing::Clock::now();
@@ -107,7 +107,7 @@ TEST_CASE("faults: an owner reports a killed daemon and continues with its own f
   testing::TestDomain domain;
   Process arms = domain.serve(kArmsFile);
   auto robot =
-      *Node::open("robot", {{"world", "", {}}, {"robot_1", "world", {}}}, domain.options());
+      Node::open("robot", {{"world", "", {}}, {"robot_1", "world", {}}}, domain.options()).value();
   REQUIRE(eventually([&] { return robot.lookup("world", "hand_left").has_value(); }));
   arms.kill();
   const auto lost = robot.lookup("world", "hand_left");
@@ -120,7 +120,7 @@ TEST_CASE("faults: an owner reports a killed daemon and continues with its own f
 
 TEST_CASE("faults: a killed daemon answers again after a restart") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   for (int round = 0; round < 3; ++round) {
     const auto before = client.lookup("world", "hand_left");
     REQUIRE(before);
@@ -135,7 +135,7 @@ TEST_CASE("faults: a killed daemon answers again after a restart") {
     CHECK(after->pose.matrix() == before->pose.matrix());
     // Host and process come with the presence, which may be behind the pages.
     CHECK(eventually([&] {
-      return client.partitions()->at(0).pid == static_cast<std::uint32_t>(d.arms->pid());
+      return client.partitions().value().at(0).pid == static_cast<std::uint32_t>(d.arms->pid());
     }));
   }
 }
@@ -143,7 +143,7 @@ TEST_CASE("faults: a killed daemon answers again after a restart") {
 TEST_CASE("faults: a call to a hanging daemon times out and succeeds when it resumes") {
   ThesisDaemons d;
   // Shorter than the time until a partition counts as lost.
-  auto client = *Client::open(d.domain.options(Milliseconds(50)));
+  auto client = Client::open(d.domain.options(Milliseconds(50))).value();
   REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
   const auto frozen = std::chrono::steady_clock::now();
   d.arms->freeze();
@@ -164,7 +164,7 @@ TEST_CASE("faults: a call to a hanging daemon times out and succeeds when it res
 
 TEST_CASE("faults: a daemon that DDS had lost is discovered again") {
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options(kPatience));
+  auto client = Client::open(d.domain.options(kPatience)).value();
   for (int round = 0; round < 3; ++round) {
     REQUIRE(eventually([&] { return client.lookup("world", "hand_left").has_value(); }));
     d.arms->freeze();
@@ -205,7 +205,7 @@ TEST_CASE("faults: of two daemons of one name that start at once exactly one ser
     CHECK(lost.status != 0);
     CHECK(lost.out.empty());
     CHECK_THAT(lost.err, ContainsSubstring("process " + std::to_string(winner.pid())));
-    auto client = *Client::open(domain.options());
+    auto client = Client::open(domain.options()).value();
     CHECK(client.lookup("arm_1", "hand_left"));
     const auto partitions = client.partitions().value();
     REQUIRE(partitions.size() == 1);
@@ -216,7 +216,7 @@ TEST_CASE("faults: of two daemons of one name that start at once exactly one ser
 TEST_CASE("faults: a daemon that gets SIGINT or SIGTERM announces its end and exits with 0") {
   const int signal = GENERATE(2, 15);  // SIGINT, SIGTERM
   ThesisDaemons d;
-  auto client = *Client::open(d.domain.options(kPatience));
+  auto client = Client::open(d.domain.options(kPatience)).value();
   REQUIRE(client.lookup("world", "hand_left"));
   d.arms->signal(signal);
   CHECK(d.arms->wait(in_time()) == 0);

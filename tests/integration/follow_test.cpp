@@ -47,7 +47,7 @@ struct Robot {
   [[nodiscard]] Client follower(const std::vector<std::string>& follow) const {
     Options options = domain.options();
     options.follow = follow;
-    return *Client::open(options);
+    return Client::open(options).value();
   }
 
   TestDomain domain;
@@ -82,7 +82,7 @@ class Earlier final : public testing::Relay {
 Node earlier(const Options& options, const std::string& partition,
              const std::vector<FrameSpec>& frames) {
   auto real = *make_fastdds_transport({options.domain, options.profile, partition, nullptr});
-  return *Node::open(std::make_unique<Earlier>(std::move(real)), partition, frames, options);
+  return Node::open(std::make_unique<Earlier>(std::move(real)), partition, frames, options).value();
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ TEST_CASE("follow: a new client finds frames and is certain about those that do 
   Client client = robot.follower({});
   CHECK(x_of(client.lookup("world", "hand")) == 11);
   CHECK(outcome(client.parent("foot")) == "unknown_frame");
-  CHECK(client.frames()->empty());
+  CHECK(client.frames().value().empty());
   Client other = robot.follower({"arm"});
   const auto frames = other.frames();
   REQUIRE(frames);
@@ -141,7 +141,7 @@ TEST_CASE("follow: frames that another daemon takes over are found with a new ro
   robot.left.emplace(robot.domain.serve(robot.left_config));
   CHECK(eventually([&] { return x_of(client.lookup("world", "hand")) == 111; }));
   CHECK(eventually([&] { return x_of(path->latest()) == 111; }));
-  CHECK(client.path("world", "hand")->front().partition == "left");
+  CHECK(client.path("world", "hand").value().front().partition == "left");
 }
 
 TEST_CASE("follow: a daemon that restarts is found again") {

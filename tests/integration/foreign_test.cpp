@@ -34,13 +34,14 @@ using testing::revolute_named;
 
 struct Counted {
   Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
-      : node(*Node::open(
-            *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
-            partition,
-            {{frame, "", {}},
-             {frame + "_tip", frame, {}},
-             testing::moved_by(frame + "_wrist", frame,
-                               testing::revolute_named(frame + "_joint"))})) {}
+      : node(Node::open(
+                 *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
+                 partition,
+                 {{frame, "", {}},
+                  {frame + "_tip", frame, {}},
+                  testing::moved_by(frame + "_wrist", frame,
+                                    testing::revolute_named(frame + "_joint"))})
+                 .value()) {}
 
   std::shared_ptr<FastDdsCounters> counters = std::make_shared<FastDdsCounters>();
   Node node;
@@ -188,8 +189,9 @@ TEST_CASE("joint positions of a plain DDS writer move the edges of their owner")
   const auto transport = [&](const char* partition) {
     return *make_fastdds_transport({domain.number(), TFDUDE_LOOPBACK_PROFILE, partition, counters});
   };
-  auto arm = *Node::open(transport("arm"), "arm",
-                         {{"base", "", {}}, moved_by("fore", "base", revolute_named("elbow"))});
+  auto arm = Node::open(transport("arm"), "arm",
+                        {{"base", "", {}}, moved_by("fore", "base", revolute_named("elbow"))})
+                 .value();
   const auto to_all = GENERATE(true, false);
   ForeignWriter writer(domain.number(), "tfdude/joint",
                        fastdds::edds::TypeSupport(new wire::JointsPubSubType),
@@ -214,7 +216,7 @@ TEST_CASE("joint positions of a plain DDS writer move the edges of their owner")
     ++written;
     CHECK(eventually([&] { return counters->updates_arrived == written; }));
   }
-  CHECK(eventually([&] { return arm.joints("arm")->at(0).position == 0.5; }));
+  CHECK(eventually([&] { return arm.joints("arm").value().at(0).position == 0.5; }));
   const auto X = arm.lookup("base", "fore", Query{});
   REQUIRE(X);
   CHECK(nanoseconds(*X->stamp) == 1'700'000'000'000'000'000);
@@ -325,8 +327,8 @@ TEST_CASE("malformed samples are counted and change nothing") {
   CHECK(other.node.lookup("a", "a_tip"));
   REQUIRE(other.node.update("a_tip", {}));
   CHECK_FALSE(moved(owner.node, "a"));
-  CHECK(other.node.frames()->size() == 6);
-  CHECK(other.node.partitions()->size() == 2);
+  CHECK(other.node.frames().value().size() == 6);
+  CHECK(other.node.partitions().value().size() == 2);
 }
 
 }  // namespace tfdude

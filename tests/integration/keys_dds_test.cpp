@@ -121,15 +121,15 @@ TEST_CASE("keys in DDS: only who may publish the time is heard") {
   options.timeout = Milliseconds(100);
   options.clock = ClockKind::kExternal;
   options.keys = keys.path("arm");
-  Node arm = *Node::open("arm", {}, options);
+  Node arm = Node::open("arm", {}, options).value();
   options.keys = keys.path("eye");
-  Client eye = *Client::open(options);
+  Client eye = Client::open(options).value();
   const Time now = time_of(7);
   const auto rejected = eye.publish_clock(now);
   REQUIRE_FALSE(rejected);
   CHECK(rejected.error().code == Errc::kNotPermitted);
   options.keys = keys.path("clock");
-  Client publisher = *Client::open(options);
+  Client publisher = Client::open(options).value();
   CHECK(eventually([&] { return publisher.publish_clock(now) && arm.now() == now; }));
 }
 
@@ -172,7 +172,7 @@ TEST_CASE("keys in DDS: an expired or revoked certificate creates no participant
   (void)keys.add("revoked", looking(), Days(20));
   fs::copy(keys.path("revoked"), revoked);
   REQUIRE(revoke_identity(keys.path(), "revoked", before));
-  KeyFiles files = *find_keys(revoked, before);
+  KeyFiles files = find_keys(revoked, before).value();
   CHECK(Participant(domain.number(), &files).good());
   files.revoked = current.revoked;
   CHECK_FALSE(Participant(domain.number(), &files).good());

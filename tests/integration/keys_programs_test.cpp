@@ -233,7 +233,7 @@ TEST_CASE("keys: expired and exchanged keys are rejected by name") {
       refused(robot.cli(stolen, {"--json", "remove", "secret_forearm"}), "config");
   CHECK_THAT(replayed, ContainsSubstring("is for the certificate"));
   // A participant that does not check its own keys.
-  KeyFiles files = *find_keys(robot.keys.path("eye"), now());
+  KeyFiles files = find_keys(robot.keys.path("eye"), now()).value();
   files.permissions = robot.keys.path("mover") + "/permissions.p7s";
   DdsParticipant liar(robot.domain.number(), &files);
   if (liar.good()) {
@@ -258,7 +258,7 @@ TEST_CASE("keys: a daemon may serve only its own partition") {
 
 TEST_CASE("keys: nobody announces frames or presence in another's name") {
   const SecuredRobot robot;
-  const KeyFiles arm = *find_keys(robot.keys.path("arm"), now());
+  const KeyFiles arm = find_keys(robot.keys.path("arm"), now()).value();
   DdsParticipant forger(robot.domain.number(), &arm);
   REQUIRE(forger.good());
   auto* pages = forger.write_durable<fastdds::PageType>(kDirectoryTopic, "arm");

@@ -72,7 +72,7 @@ class Member {
 
   Announced announced_;
   FastDdsCounters counters_;
-  const Profiles profiles_ = *Profiles::load(TFDUDE_LOOPBACK_PROFILE);
+  const Profiles profiles_ = Profiles::load(TFDUDE_LOOPBACK_PROFILE).value();
   const std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   edds::DomainParticipant* participant_ = nullptr;
   edds::Topic* topic_ = nullptr;

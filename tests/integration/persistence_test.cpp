@@ -83,7 +83,7 @@ std::string content(const std::string& file) {
 
 TEST_CASE("persistence: acknowledged changes survive a kill at any instant") {
   Keeper arms(kArms);
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   Random random(0x9e51);
   INFO("seed " << random.seed());
   int next = 0;
@@ -91,7 +91,7 @@ TEST_CASE("persistence: acknowledged changes survive a kill at any instant") {
   for (int round = 0; round < 5; ++round) {
     // The kill interrupts a call of another thread; the result of that call is unknown.
     auto other = std::async(std::launch::async, [domain = &arms.domain, round] {
-      auto caller = *Client::open(domain->options(Milliseconds(300)));
+      auto caller = Client::open(domain->options(Milliseconds(300))).value();
       for (int i = 0; i < 1000; ++i) {
         if (!caller.add("other_" + std::to_string(round) + "_" + std::to_string(i), "arm", {}))
           return;
@@ -118,7 +118,7 @@ TEST_CASE("persistence: acknowledged changes survive a kill at any instant") {
       const double far = number % 3 == 0 ? 0 : 10;
       REQUIRE(x_of(client.lookup("arm", id)) == far + number);
     }
-    auto fresh = *Client::open(arms.domain.options());
+    auto fresh = Client::open(arms.domain.options()).value();
     for (int gone = 0; gone < next; gone += 5)
       CHECK_FALSE(fresh.exists("f" + std::to_string(gone)));
   }
@@ -128,7 +128,7 @@ TEST_CASE("persistence: streamed values are stored and survive a kill") {
   Keeper arms(kArms);
   arms.daemon->kill();
   arms.start({"--save-every", "50"});
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   const std::size_t before = content(arms.file() + "-wal").size();
   REQUIRE(client.publish({{"hand", along_x(77)}}));
   REQUIRE(eventually([&] { return x_of(client.lookup("arm", "hand")) == 77; }));
@@ -141,7 +141,7 @@ TEST_CASE("persistence: streamed values are stored and survive a kill") {
 
 TEST_CASE("persistence: others see the frames all the time while their daemon restarts") {
   Keeper arms(kArms);
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   REQUIRE(client.exists("hand"));
   arms.daemon->kill();
   std::atomic<bool> stop{false};
@@ -168,7 +168,7 @@ TEST_CASE("persistence: others see the frames all the time while their daemon re
 TEST_CASE("persistence: edited entries of a configuration override the stored state") {
   Keeper arms(kArms);
   {
-    auto client = *Client::open(arms.domain.options());
+    auto client = Client::open(arms.domain.options()).value();
     REQUIRE(client.update("hand", along_x(20)));
     REQUIRE(client.update("arm", along_x(30)));
     REQUIRE(client.add("tool", "hand", along_x(100)));
@@ -181,7 +181,7 @@ frames:
 )");
   arms.restart();
   CHECK_THAT(arms.ready, ContainsSubstring("frames=4"));
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   CHECK(x_of(client.lookup("arm", "tool")) == 120);
   CHECK(client.exists("eye"));
 }
@@ -224,10 +224,10 @@ TEST_CASE("persistence: an owner that missed a removal removes its frames when i
   const std::vector<std::string> arguments{"--config", tools, "--state", arms.directory.path()};
   auto gripper = arms.domain.start_daemon(arguments);
   await_ready(gripper);
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   REQUIRE(eventually([&] { return client.lookup("arm", "finger").has_value(); }));
   gripper.kill();
-  REQUIRE(eventually([&] { return !client.partitions()->at(1).reachable; }));
+  REQUIRE(eventually([&] { return !client.partitions().value().at(1).reachable; }));
   REQUIRE(client.remove("hand"));
   bool gone = true;
   SECTION("although the other owner restarted meanwhile") {
@@ -242,10 +242,10 @@ TEST_CASE("persistence: an owner that missed a removal removes its frames when i
   auto again = arms.domain.start_daemon(arguments);
   await_ready(again);
   CHECK(eventually([&] {
-    return client.partitions()->at(1).reachable && client.exists("gripper") != gone &&
+    return client.partitions().value().at(1).reachable && client.exists("gripper") != gone &&
            client.exists("finger") != gone;
   }));
-  auto fresh = *Client::open(arms.domain.options());
+  auto fresh = Client::open(arms.domain.options()).value();
   CHECK(fresh.exists("finger") != gone);
 }
 

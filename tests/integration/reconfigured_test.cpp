@@ -69,7 +69,7 @@ struct Arms {
 
 TEST_CASE("reconfigured: a daemon without a configuration restores its whole state") {
   Arms arms;
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   REQUIRE(client.add("tool", "hand", along_x(100)));
   REQUIRE(client.update("hand", along_x(20)));
   arms.restart({"--partition", "arms"});
@@ -87,7 +87,7 @@ TEST_CASE("reconfigured: a deleted entry removes its frame and no frame below it
       "tools.yaml", "partition: tools\nframes:\n  - {id: gripper, parent: hand}\n");
   auto other = arms.domain.start_daemon({"--config", tools, "--state", arms.directory.path()});
   await_ready(other);
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   REQUIRE(eventually([&] { return client.lookup("arm", "gripper").has_value(); }));
   REQUIRE(client.add("tool", "hand", along_x(100)));
   REQUIRE(client.add("tip", "tool", along_x(1000)));
@@ -134,7 +134,7 @@ TEST_CASE("reconfigured: a deleted entry removes its frame and no frame below it
 
 TEST_CASE("reconfigured: --check prints what a configuration would change and changes nothing") {
   Arms arms;
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   REQUIRE(client.add("tool", "hand", along_x(100)));
   const std::string domain = std::to_string(arms.domain.number());
   const std::string file = arms.directory.path() + "/domain-" + domain + "/arms.sqlite";
@@ -280,7 +280,7 @@ TEST_CASE("reconfigured: a daemon says who owns the links that it cannot have") 
 
 TEST_CASE("reconfigured: correlations from observations and requests survive a kill") {
   Arms arms;
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   const Covariance some = *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01});
   for (const auto& [id, x] : {std::pair("tool", 1.0), std::pair("tip", 2.0)}) {
     REQUIRE(client.add(id, id == std::string("tool") ? "hand" : "tool", {along_x(x).pose, some}));

@@ -137,7 +137,7 @@ void check_wrong_usage(const TestDomain& domain, const std::vector<Refusal>& wro
 
 TEST_CASE("cli: input that breaks a rule is rejected by name and changes nothing") {
   const ThesisDaemons d;
-  auto client = *Client::open(d.domain.options());
+  auto client = Client::open(d.domain.options()).value();
   const std::string before = snapshot(client);
   for (const Refusal& refusal : kRefusals) {
     Arguments arguments = refusal.arguments;

@@ -15,9 +15,10 @@ namespace {
 
 struct Counted {
   Counted(std::uint32_t domain, const std::string& partition, const std::string& frame)
-      : node(*Node::open(
-            *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
-            partition, {{frame, "", {}}})) {}
+      : node(Node::open(
+                 *make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, partition, counters}),
+                 partition, {{frame, "", {}}})
+                 .value()) {}
 
   std::shared_ptr<FastDdsCounters> counters = std::make_shared<FastDdsCounters>();
   Node node;
@@ -31,7 +32,7 @@ TEST_CASE("a participant that does not own the frame receives no request") {
   Counted owner(domain, "owner", "a");
   Counted other(domain, "other", "b");
   auto client =
-      *Client::open(*make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, "", nullptr}));
+      Client::open(*make_fastdds_transport({domain, TFDUDE_LOOPBACK_PROFILE, "", nullptr})).value();
   constexpr std::uint64_t kCalls = 100;
   for (std::uint64_t i = 0; i < kCalls; ++i) {
     REQUIRE(client.update("a", {}));

@@ -132,7 +132,7 @@ TEST_CASE("service: while its loop hangs the daemon does not feed the watchdog")
   await_ready(daemon);
   CHECK_THAT(manager.next(), ContainsSubstring("READY=1"));
   CHECK(manager.next() == "WATCHDOG=1");
-  auto client = *Client::open(domain.options());
+  auto client = Client::open(domain.options()).value();
   const auto deadline = testing::in_time();
   Result<void> added;
   std::thread changing([&] { added = client.add("hand", "arm", {}); });

@@ -98,7 +98,7 @@ TEST_CASE("storing: changes that a full disk does not take are neither confirmed
   }
   Arms arms(disk);
   const TestDomain& domain = arms.domain;
-  auto client = *Client::open(domain.options());
+  auto client = Client::open(domain.options()).value();
   REQUIRE(client.add("kept", "hand", {}));
   REQUIRE(client.add("gone", "hand", {}));
   REQUIRE(client.remove("gone"));
@@ -116,7 +116,7 @@ TEST_CASE("storing: changes that a full disk does not take are neither confirmed
   CHECK(outcome(client.update("kept", along_x(3))) == "state");
   // The frame is not visible to anybody, so adding it again does not report that it exists.
   CHECK(outcome(client.add(refused, "hand", {})) == "state");
-  auto joiner = *Client::open(domain.options());
+  auto joiner = Client::open(domain.options()).value();
   CHECK_FALSE(joiner.exists(refused));
   CHECK(joiner.exists("kept"));
 
@@ -129,7 +129,7 @@ TEST_CASE("storing: changes that a full disk does not take are neither confirmed
   SECTION("they are lost if the process ends before and nothing else is") { disk.make_room(); }
   arms.restart();
   for (const std::string& id : there) CHECK(eventually([&] { return client.exists(id); }));
-  auto fresh = *Client::open(domain.options());
+  auto fresh = Client::open(domain.options()).value();
   CHECK_FALSE(fresh.exists("gone"));
 }
 
@@ -140,7 +140,7 @@ TEST_CASE("storing: a rejected removal has not happened after a kill") {
     return;
   }
   Arms arms(disk);
-  auto client = *Client::open(arms.domain.options());
+  auto client = Client::open(arms.domain.options()).value();
   disk.fill();
   int acknowledged = 0;
   std::string last;
@@ -158,7 +158,7 @@ TEST_CASE("storing: a rejected removal has not happened after a kill") {
   INFO(acknowledged << " removals were stored");
   disk.make_room();
   arms.restart();
-  auto fresh = *Client::open(arms.domain.options());
+  auto fresh = Client::open(arms.domain.options()).value();
   CHECK(fresh.exists("hand") == (last == "hand"));
 }
 
@@ -193,7 +193,7 @@ TEST_CASE("storing: with --sync a change is acknowledged after the disk has sync
   Process daemon = start_on_slow_disk(domain, files, "300", {"--sync"});
   Options patient = domain.options();
   patient.timeout = Milliseconds(20000);
-  auto client = *Client::open(patient);
+  auto client = Client::open(patient).value();
   for (const std::string id : {"a", "b"}) {
     const auto start = Clock::now();
     REQUIRE(client.add(id, "hand", {}));
@@ -209,8 +209,8 @@ TEST_CASE("storing: lookups and streams continue while the disk takes a second f
   const TestDomain domain;
   const TemporaryDirectory files;
   Process daemon = start_on_slow_disk(domain, files, "1000", {});
-  auto client = *Client::open(domain.options());
-  auto other = *Client::open(domain.options());
+  auto client = Client::open(domain.options()).value();
+  auto other = Client::open(domain.options()).value();
   REQUIRE(other.exists("hand"));
   std::atomic<bool> stop{false};
   Clock::duration silence{0};

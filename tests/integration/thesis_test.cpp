@@ -44,12 +44,12 @@ struct Robot {
   explicit Robot(int who) {
     if (who != kRobotCalls) robot.emplace(domain.serve(kRobotFile));
     if (who != kArmsCall) arms.emplace(domain.serve(kArmsFile));
-    witness.emplace(*Client::open(domain.options()));
+    witness.emplace(Client::open(domain.options()).value());
     if (who == kThirdCalls) {
-      third.emplace(*Client::open(domain.options()));
+      third.emplace(Client::open(domain.options()).value());
     } else {
       const auto config = load_config(who == kRobotCalls ? kRobotFile : kArmsFile);
-      owner.emplace(*Node::open(config->partition, config->frames, domain.options()));
+      owner.emplace(Node::open(config->partition, config->frames, domain.options()).value());
     }
     for (const std::string& file : {kRobotFile, kArmsFile}) {
       const auto config = load_config(file);
@@ -145,10 +145,8 @@ TEST_CASE("processes: frames are added from their owner's process and from other
   r.oracle.add("tool", "camera", kX);
   r.oracle.add("hand", "arm_2", kY);
   r.check_agreement();
-  CHECK(*r.caller().path("camera", "tool").map([](const auto& p) { return p.at(0).partition; }) ==
-        "robot");
-  CHECK(*r.caller().path("arm_2", "hand").map([](const auto& p) { return p.at(0).partition; }) ==
-        "arms");
+  CHECK(r.caller().path("camera", "tool").value().at(0).partition == "robot");
+  CHECK(r.caller().path("arm_2", "hand").value().at(0).partition == "arms");
 }
 
 TEST_CASE("processes: a frame cannot be added below a parent that does not exist") {

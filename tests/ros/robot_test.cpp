@@ -60,7 +60,7 @@ TEST_CASE("ros robot: joints of ROS move the robot of a daemon, with the stated 
   RosPeer peer(rig.ros_domain());
   peer.advertise("/joint_states", "joints", GENERATE("reliable", "best_effort"));
   Client client = rig.client();
-  const std::string name = client.joints("robot")->front().name;
+  const std::string name = client.joints("robot").value().front().name;
   REQUIRE(eventually([&] {
     peer.publish("/joint_states", now_ns() + " nobody 3 " + name + " 0.25");
     return joint_of(client, "robot", name).position == 0.25;
@@ -73,7 +73,7 @@ TEST_CASE("ros robot: measured joints are sent, and what ROS publishes does not 
   auto daemon = rig.dude().start_daemon({"--partition", "robot", "--urdf", kRobot});
   testing::await_ready(daemon);
   Client client = rig.client();
-  const auto joints = *client.joints("robot");
+  const auto joints = client.joints("robot").value();
   REQUIRE(joints.size() >= 2);
   const testing::TemporaryDirectory files;
   const auto bridge =
@@ -107,14 +107,14 @@ TEST_CASE("ros robot: a description is served as by a daemon, and a new one repl
   peer.publish("/robot_description", "@" + kRobot);
   const auto bridge = rig.start_bridge({"--description", "--joints", "0.001", "--prefix", "r1/"});
   Client client = rig.client();
-  REQUIRE(eventually([&] { return client.frames()->size() > 1; }));
-  const auto frames = *client.frames();
+  REQUIRE(eventually([&] { return client.frames().value().size() > 1; }));
+  const auto frames = client.frames().value();
   for (const Frame& frame : frames) {
     // Where the root link is, /tf may say.
     CHECK(frame.partition == (frame.parent.empty() ? "ros" : "robot"));
     CHECK(frame.id.rfind("r1/", 0) == 0);
   }
-  const std::string name = client.joints("robot")->front().name;
+  const std::string name = client.joints("robot").value().front().name;
   peer.advertise("/joint_states", "joints", "reliable");
   REQUIRE(eventually([&] {
     peer.publish("/joint_states", now_ns() + ' ' + name.substr(3) + " 0.25");
@@ -159,7 +159,7 @@ TEST_CASE("ros robot: a description that comes after its links on /tf gets them"
                                  "<joint name='j' type='fixed'><parent link='base'/>"
                                  "<child link='arm'/><origin xyz='2 0 0'/></joint></robot>"));
   const auto partition_of = [&](const std::string& id) {
-    const auto frames = *client.frames();
+    const auto frames = client.frames().value();
     for (const Frame& frame : frames) {
       if (frame.id == id) return frame.partition;
     }
@@ -193,7 +193,7 @@ TEST_CASE("ros robot: the description that a daemon serves reaches ROS, and its 
   const auto serving = [&](const std::string& description) {
     Options options = rig.dude().options();
     options.description = description;
-    return *Node::open("arm", {{"base", "", {}}}, options);
+    return Node::open("arm", {{"base", "", {}}}, options).value();
   };
   const auto bridge = rig.start_bridge({"--publish-description", "arm"});
   RosPeer peer(rig.ros_domain());
@@ -208,11 +208,12 @@ TEST_CASE("ros robot: a path is sent with its covariance about fixed axes") {
   const RosRig rig;
   Transform X{*Pose::create(from_rpy(0.1, 0.2, 1.5), Eigen::Vector3d(1, 2, 3)),
               *Covariance::from_stddev({0.01, 0.02, 0.03, 0.001, 0.002, 0.003})};
-  Node node = *Node::open("arm",
-                          {{"base", "", {}},
-                           {"tool", "base", X},
-                           {"odd", "base", {{}, StatedCovariance::unspecified()}}},
-                          rig.dude().options());
+  Node node = Node::open("arm",
+                         {{"base", "", {}},
+                          {"tool", "base", X},
+                          {"odd", "base", {{}, StatedCovariance::unspecified()}}},
+                         rig.dude().options())
+                  .value();
   const testing::TemporaryDirectory files;
   auto bridge = rig.start_bridge(
       {"--config", files.write("b.yaml",
@@ -252,8 +253,8 @@ TEST_CASE("ros robot: a path is sent with its covariance about fixed axes") {
 TEST_CASE("ros robot: poses and odometry are observed, and the gate's answers are counted") {
   const RosRig rig;
   Transform uncertain{{}, *Covariance::from_stddev({1, 1, 1, 0.1, 0.1, 0.1})};
-  Node node =
-      *Node::open("map", {{"map", "", {}}, {"base", "map", uncertain}}, rig.dude().options());
+  Node node = Node::open("map", {{"map", "", {}}, {"base", "map", uncertain}}, rig.dude().options())
+                  .value();
   const testing::TemporaryDirectory files;
   auto bridge = rig.start_bridge({"--config", files.write("b.yaml",
                                                           "poses_in:\n"
@@ -262,7 +263,7 @@ TEST_CASE("ros robot: poses and odometry are observed, and the gate's answers ar
   RosPeer peer(rig.ros_domain());
   peer.advertise("/gps", "pose", "reliable");
   peer.advertise("/odom", "odometry", "reliable");
-  const auto x = [&] { return node.lookup("map", "base")->pose.translation().x(); };
+  const auto x = [&] { return node.lookup("map", "base").value().pose.translation().x(); };
   peer.publish("/gps", "0 map 0.5 0 0 0 0 0 1 0.01");
   REQUIRE(eventually([&] { return x() > 0.4; }));
   const double after_gps = x();
@@ -285,7 +286,7 @@ TEST_CASE("ros robot: the clock of ROS is that of those who have an external clo
   const auto bridge = rig.start_bridge({"--clock", "ros"});
   auto options = rig.dude().options(Milliseconds(200));
   options.clock = ClockKind::kExternal;
-  Node node = *Node::open("sim", {{"a", "", {}}, {"b", "a", {}}}, options);
+  Node node = Node::open("sim", {{"a", "", {}}, {"b", "a", {}}}, options).value();
   RosPeer peer(rig.ros_domain());
   peer.advertise("/clock", "clock", "best_effort");
   const auto await = [&](std::int64_t ns) {
@@ -296,18 +297,20 @@ TEST_CASE("ros robot: the clock of ROS is that of those who have an external clo
   };
   REQUIRE(await(5'000'000'000));
   REQUIRE(node.update("b", {}, time_of(5'000'000'000)));
-  CHECK(node.history("b")->front().samples == 1);
+  CHECK(node.history("b").value().front().samples == 1);
   // A jump back clears what comes later.
   REQUIRE(await(1'000'000'000));
-  CHECK(eventually(
-      [&] { return node.history("b")->empty() || node.history("b")->front().samples == 0; }));
+  CHECK(eventually([&] {
+    return node.history("b").value().empty() || node.history("b").value().front().samples == 0;
+  }));
 }
 
 TEST_CASE("ros robot: odometry of a moving frame is sent with its velocity") {
   const RosRig rig;
   const Covariance small = *Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4});
   Node node =
-      *Node::open("base", {{"odom", "", {}}, {"base", "odom", {{}, small}}}, rig.dude().options());
+      Node::open("base", {{"odom", "", {}}, {"base", "odom", {{}, small}}}, rig.dude().options())
+          .value();
   const testing::TemporaryDirectory files;
   const auto bridge = rig.start_bridge(
       {"--config",

@@ -74,7 +74,7 @@ class RosRig {
   /// The same in another domain of tf-dude.
   [[nodiscard]] Process start_bridge(std::uint32_t dude,
                                      const std::vector<std::string>& arguments) const;
-  [[nodiscard]] Client client() const { return *Client::open(dude_.options()); }
+  [[nodiscard]] Client client() const { return Client::open(dude_.options()).value(); }
 
  private:
   TestDomain dude_;

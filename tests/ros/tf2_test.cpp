@@ -98,15 +98,17 @@ TEST_CASE("ros tf2: what the peer publishes gives the same answers here and in t
 TEST_CASE("ros tf2: what tf-dude sends gives the same answers here and in tf2") {
   std::mt19937 random(21);  // NOLINT(cert-msc51-cpp): the same each time
   const RosRig rig;
-  Node base = *Node::open("base",
-                          {{"map", "", {}},
-                           {"odom", "map", {}},
-                           {"base", "odom", {}},
-                           {"camera", "base", {random_pose(random), {}}}},
-                          rig.dude().options());
+  Node base = Node::open("base",
+                         {{"map", "", {}},
+                          {"odom", "map", {}},
+                          {"base", "odom", {}},
+                          {"camera", "base", {random_pose(random), {}}}},
+                         rig.dude().options())
+                  .value();
   Node arm =
-      *Node::open("arm", {{"mount", "base", {random_pose(random), {}}}, {"tool", "mount", {}}},
-                  rig.dude().options());
+      Node::open("arm", {{"mount", "base", {random_pose(random), {}}}, {"tool", "mount", {}}},
+                 rig.dude().options())
+          .value();
   // The mount of the arm is not known to ROS: the tool is sent in the base.
   const auto bridge =
       rig.start_bridge({"--export", "base", "--export-frame", "tool", "--rate", "0"});

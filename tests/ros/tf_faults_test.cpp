@@ -74,7 +74,7 @@ TEST_CASE("ros faults: frames of another partition are not taken, also while it 
   auto daemon = rig.dude().start_daemon({"--config", config});
   testing::await_ready(daemon);
   // It remembers who is away.
-  Node witness = *Node::open("witness", {{"w", "", {}}}, rig.dude().options());
+  Node witness = Node::open("witness", {{"w", "", {}}}, rig.dude().options()).value();
   REQUIRE(eventually([&] { return owner_of(client, "tool") == "arm"; }));
 
   RosPeer peer(rig.ros_domain());
@@ -139,7 +139,7 @@ TEST_CASE("ros faults: names of 10 kB and odd values are refused, all others tak
   Client client = rig.client();
   REQUIRE(eventually([&] { return x_of(client, "odom", "wheel") == 7; }));
   CHECK(x_of(client, "odom", "base") == 1);
-  CHECK(client.frames()->size() == 3);
+  CHECK(client.frames().value().size() == 3);
   bridge.signal(SIGTERM);
   CHECK(bridge.wait(testing::in_time()) == 0);
   CHECK_THAT(bridge.err(), ContainsSubstring("taken=2 not taken: names=1 values=3"));
@@ -156,7 +156,7 @@ TEST_CASE("ros faults: a thousand frames in one message, in and out") {
     own.push_back({"own_" + number, i % 10 == 0 ? "root" : "own_" + std::to_string(i - 1), {}});
     foreign.push_back({i % 10 == 0 ? "map" : "f_" + std::to_string(i - 1), "f_" + number, at_x(1)});
   }
-  Node node = *Node::open("robot", own, rig.dude().options());
+  Node node = Node::open("robot", own, rig.dude().options()).value();
   const auto out = rig.start_bridge({"--export", "robot", "--partition", "ros_2"});
   RosPeer peer(rig.ros_domain());
   peer.obey("listen /tf_static tf latched");
@@ -180,14 +180,15 @@ TEST_CASE("ros faults: a jump back of time clears the history, and values go on"
   REQUIRE(eventually([&] { return x_of(client, "odom", "base") == 109; }));
   peer.publish("/tf", tf_message(at(1), {{"odom", "base", at_x(1)}}));
   REQUIRE(eventually([&] { return x_of(client, "odom", "base") == 1; }));
-  CHECK(client.history("base")->front().samples == 1);
+  CHECK(client.history("base").value().front().samples == 1);
   peer.publish("/tf", tf_message(at(2), {{"odom", "base", at_x(2)}}));
   CHECK(eventually([&] { return x_of(client, "odom", "base") == 2; }));
 }
 
 TEST_CASE("ros faults: what came in does not go out again, with two bridges") {
   const RosRig rig;
-  Node node = *Node::open("robot", {{"world", "", {}}, {"arm", "world", {}}}, rig.dude().options());
+  Node node =
+      Node::open("robot", {{"world", "", {}}, {"arm", "world", {}}}, rig.dude().options()).value();
   const auto one = rig.start_bridge({"--export", "*"});
   const auto two = rig.start_bridge({"--export", "*", "--partition", "ros_2"});
   RosPeer listener(rig.ros_domain());

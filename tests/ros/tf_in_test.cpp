@@ -110,7 +110,7 @@ TEST_CASE("ros tf in: both domains may be the same") {
   peer.publish("/tf", tf_message(at(1), {{"odom", "base", pose(1, 0.1)}}));
   auto options = rig.dude().options();
   options.domain = rig.ros_domain();
-  Client client = *Client::open(options);
+  Client client = Client::open(options).value();
   CHECK(eventually([&] { return client.lookup("odom", "base").has_value(); }));
 }
 
@@ -127,9 +127,9 @@ TEST_CASE("ros tf in: patterns and a prefix choose the frames of a robot") {
                                          {"/odom", "/base", pose(2, 0.1)}}));
   Client client = rig.client();
   REQUIRE(eventually([&] { return client.lookup("r1/odom", "r1/base").has_value(); }));
-  CHECK(client.lookup("r1/odom", "r1/base")->covariance.complete());
+  CHECK(client.lookup("r1/odom", "r1/base").value().covariance.complete());
   const auto frames = client.frames();
-  REQUIRE(frames->size() == 2);
+  REQUIRE(frames.value().size() == 2);
   CHECK(frames->front().partition == "r1");
 }
 

@@ -51,12 +51,13 @@ std::map<std::string, ReceivedTransform> await(RosPeer& peer, const std::string&
 
 TEST_CASE("ros tf out: dynamic and static frames of a partition reach a late peer") {
   const RosRig rig;
-  Node node = *Node::open("robot",
-                          {{"world", "", {}},
-                           {"base", "world", pose(1, 0)},
-                           {"mast", "base", pose(2, 0.5)},
-                           {"camera", "mast", pose(3, 1)}},
-                          rig.dude().options());
+  Node node = Node::open("robot",
+                         {{"world", "", {}},
+                          {"base", "world", pose(1, 0)},
+                          {"mast", "base", pose(2, 0.5)},
+                          {"camera", "mast", pose(3, 1)}},
+                         rig.dude().options())
+                  .value();
   auto bridge = rig.start_bridge({"--export", "robot"});
   RosPeer peer(rig.ros_domain(), GENERATE(false, true));
   peer.obey("listen /tf_static tf latched");
@@ -91,7 +92,8 @@ TEST_CASE("ros tf out: frames of an owner that is not reachable are not sent, un
   const testing::TemporaryDirectory files;
   const std::string arm = files.write(
       "arm.yaml", "partition: arm\nframes:\n  - {id: tool, parent: base, xyz: [1, 0, 0]}\n");
-  Node node = *Node::open("base", {{"world", "", {}}, {"base", "world", {}}}, rig.dude().options());
+  Node node =
+      Node::open("base", {{"world", "", {}}, {"base", "world", {}}}, rig.dude().options()).value();
   auto daemon = rig.dude().serve(arm);
   auto bridge = rig.start_bridge({"--export", "*"});
   RosPeer peer(rig.ros_domain());

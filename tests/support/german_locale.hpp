@@ -5,8 +5,8 @@
 
 namespace tfdude::testing {
 
-/// While it exists, the process has a German locale, of C and of C++: a comma before the decimals, and
-/// points between the thousands.
+/// While it exists, the process has a German locale, of C and of C++: a comma before the decimals,
+/// and points between the thousands.
 class GermanLocale {
  public:
   /// @throws std::runtime_error if there is none.

@@ -133,7 +133,7 @@ class ScriptedOwner {
                 const std::vector<FrameSpec>& frames, Script script = {}) {
     auto ear = std::make_unique<Ear>(network.join(), std::move(script));
     ear_ = ear.get();
-    node_.emplace(*Node::open(std::move(ear), name, frames));
+    node_.emplace(Node::open(std::move(ear), name, frames).value());
   }
 
   Node& node() { return *node_; }

@@ -29,7 +29,7 @@ struct StoringOwner : Replica {
     return error == nullptr ? "ok" : error->message;
   }
   void start(const std::vector<FrameSpec>& configured = {}) {
-    REQUIRE(partition.restore(*store->load(), configured, kNow));
+    REQUIRE(partition.restore(store->load().value(), configured, kNow));
     REQUIRE(store->save(unsaved(partition)));
   }
   bool yield() { return partition.yield(partition.pending_yields(), kNow); }

@@ -12,7 +12,8 @@ namespace tfdude::testing {
 
 [[nodiscard]] inline Node open_with_tip(const Join& join, const std::string& partition) {
   const std::string base = partition + "_base";
-  return *Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}});
+  return Node::open(join(partition), partition, {{base, "", {}}, {partition + "_tip", base, {}}})
+      .value();
 }
 
 [[nodiscard]] inline bool is_at(Client& owner, const std::string& parent, const std::string& frame,

@@ -87,5 +87,10 @@ TEST_CASE("fail_at prepends the place and keeps the code") {
   CHECK(result.error().message == "frame 'arm': no answer");
 }
 
+TEST_CASE("a value that is not there fails a test with the message of the error") {
+  const Result<int> result = fail(Errc::kTimeout, "no answer from partition 'arm'");
+  CHECK_THROWS_WITH(result.value(), "no answer from partition 'arm'");
+}
+
 }  // namespace
 }  // namespace tfdude
