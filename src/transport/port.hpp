@@ -74,7 +74,7 @@ class Channel {
   virtual ~Channel() = default;
 
   /// Like Transport::send(), but at once or not at all. @return nothing if it was sent; kTimeout if
-  /// the partition cannot be reached, or the message cannot be sent now; kNotPermitted
+  /// the partition cannot be reached, or the message cannot be sent now; kNotPermitted; kTransport
   [[nodiscard]] virtual std::optional<Errc> try_send(const Message& message) = 0;
 };
 
@@ -127,7 +127,8 @@ class Transport {
       const std::string& partition) = 0;
 
   /// Waits until the receivers have acknowledged all updates that were sent. An update that was
-  /// overwritten by newer ones on its way counts as acknowledged.
+  /// overwritten by newer ones on its way counts as acknowledged, and so does one for a process
+  /// that has left, or was lost and replaced by a later one.
   /// @return kTimeout or kUnreachable, naming a partition that has not acknowledged
   [[nodiscard]] virtual Result<void> flush(Deadline deadline) = 0;
 

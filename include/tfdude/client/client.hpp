@@ -137,7 +137,7 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<JointStream> stream_joints(const std::vector<std::string>& names);
 
   /// Waits until everything that this client has streamed has reached the owners. Takes at most
-  /// `wait`.
+  /// `wait`. Owners that have left, and processes in whose place a later one serves, do not count.
   /// @return kTimeout or kUnreachable, naming an owner that has not received everything. More than
   ///   64 samples at once may overwrite each other on their way; those count as arrived.
   [[nodiscard]] Result<void> flush(Milliseconds wait);
