@@ -126,14 +126,12 @@ Samples::Broken Samples::answered(std::optional<Time> at, std::uint64_t by,
   return at ? judge_at(*at, *X, by) : judge_newest(*X, by);
 }
 
-// A process that was started again has the last value only.
+// Only the configured value holds for all times: a process that was started again has the last
+// sample with its stamp.
 Samples::Broken Samples::judge_static(const StampedTransform& X, std::uint64_t by) const {
   if (era_of(by)) return {"a history is lost", text(number_of(X)) + " holds for all times"};
-  for (std::size_t number = 0; number < samples_.size(); ++number) {
-    const bool possible = number == 0 || !samples_[number].rejected;
-    if (possible && same(number_of(X), static_cast<double>(number))) return {};
-  }
-  return {"a value that nobody wrote", text(number_of(X)) + " of a sampled edge"};
+  if (same(number_of(X), 0)) return {};
+  return {"a value that nobody wrote", text(number_of(X)) + " holds for all times"};
 }
 
 Samples::Broken Samples::judge_newest(const StampedTransform& X, std::uint64_t by) {
@@ -149,6 +147,8 @@ Samples::Broken Samples::judge_newest(const StampedTransform& X, std::uint64_t b
   if (shown == history.end() || !same(number_of(X), static_cast<double>(shown->number))) {
     return {"a value that nobody wrote", text(number_of(X)) + " at " + to_string(*X.stamp)};
   }
+  // The last one of an earlier process may have been restored: the next one begins a history.
+  if (!era_of(by)) return {};
   return taken(shown->number, by);
 }
 
