@@ -81,6 +81,8 @@ class Pages {
   /// Epochs start at the incarnation, so that they increase over all processes of a partition.
   std::uint64_t close_epoch() { return ++epoch_; }
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
+  /// The epoch for which others wait; 0 without pages, as there is nothing to wait for.
+  [[nodiscard]] std::uint64_t shown_epoch() const { return pages_.empty() ? 0 : epoch_; }
 
   /// The pages to publish since the last call, in publishing order.
   [[nodiscard]] std::vector<Page> take_changed();

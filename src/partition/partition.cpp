@@ -123,7 +123,7 @@ Reply Partition::answer(const Request& request, Time now) {
     return reply;
   }
   if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
-  reply.epoch = pages_.epoch();
+  reply.epoch = pages_.shown_epoch();
   reply.lamport_time = directory_.latest_lamport_time();
   return reply;
 }

@@ -64,6 +64,7 @@ struct Pair {
   explicit Pair(const Join& join)
       : arms(Node::open(join("arms"), "arms", {{"arm", "", {}}}).value()),
         head(Node::open(join("head"), "head", {{"neck", "", {}}}).value()),
+        idle(Node::open(join("idle"), "idle", {}).value()),
         client(Client::open(join("")).value()) {
     // The owner that started first hears of the other a moment later.
     REQUIRE(agree());
@@ -82,6 +83,7 @@ struct Pair {
 
   Node arms;
   Node head;
+  Node idle;  // has no frames, and must not keep the others from agreeing
   Client client;
 };
 

@@ -341,5 +341,16 @@ TEST_CASE("the epoch advances only with the structure") {
   CHECK(pages[0].partition == "arms");
 }
 
+TEST_CASE("a partition without pages tells no epoch that others could wait for") {
+  Arms arms;
+  REQUIRE(arms.partition.load({}, kNow));
+  REQUIRE(arms.partition.take_pages().empty());
+  CHECK(arms.ask("arms", RemoveRequest{}).epoch == 0);
+  CHECK(arms.ask("arms", ForgetRequest{"legs", 1}).epoch == 0);
+  const std::uint64_t first = arms.ask("arm", AddRequest{"", {}}).epoch;
+  CHECK(first > kLife);
+  CHECK(arms.partition.take_pages().at(0).epoch == first);
+}
+
 }  // namespace
 }  // namespace tfdude

@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "support/captured_log.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/rig.hpp"
@@ -189,6 +190,18 @@ TEST_CASE("writes: an unreachable partition is forgotten by all reachable partic
   arm.leave();
   CHECK(outcome(writer.writes.forget("arm")) == "unreachable");
   CHECK(writer.structure.forest.exists("hand"));
+}
+
+TEST_CASE("writes: nobody waits for the structure of a partition without frames") {
+  LoopbackNetwork network;
+  const ScriptedOwner idle(network, "idle", {});
+  ScriptedOwner leg(network, "leg", kLeg);
+  Writer writer(network);
+  REQUIRE(writer.discovery.await(Deadline(10s)));
+  leg.leave();
+  const testing::CapturedLog log;
+  REQUIRE(writer.writes.forget("leg"));
+  CHECK(log.count("has not arrived here") == 0);
 }
 
 }  // namespace tfdude
