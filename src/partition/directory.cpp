@@ -138,16 +138,23 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
   partition.successor.reset();
   Ids stays;
   for (const auto& [number, page] : pages) {
+    put_removals(page, owner);
     for (const PageEntry& entry : page.entries) stays.insert(entry.id);
   }
   for (auto& [number, page] : partition.pages) {
     unclaim_all_but(stays, partition, owner, number);
     replace_joints(page, {}, owner);
   }
-  partition.pages.clear();
+  const auto before = std::exchange(partition.pages, {});
   // The first claim to each frame now replaces that of the previous incarnation, whichever is
   // younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
+  for (const auto& [number, page] : before) {
+    const auto now = partition.pages.find(number);
+    erase_removals(page.tombstones,
+                   now != partition.pages.end() ? now->second.tombstones : std::vector<Tombstone>(),
+                   owner, number);
+  }
   claims_.mend();
   report(fresh, owner);
   for (const auto& [number, page] : pages) find_orphans(page.tombstones, owner);
@@ -157,6 +164,8 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
 void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& outdated) {
   Ids stays;
   for (const PageEntry& entry : page.entries) stays.insert(entry.id);
+  // In an order in which no claim comes into force that the page as a whole ends.
+  put_removals(page, owner);
   unclaim_all_but(stays, partition, owner, page.number);
   KeptPage& kept = partition.pages[page.number];
   kept.ids.clear();
@@ -171,7 +180,8 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
     kept.ids += entry.id;
   }
   kept.ids.shrink_to_fit();
-  kept.tombstones = page.tombstones;
+  erase_removals(std::exchange(kept.tombstones, page.tombstones), page.tombstones, owner,
+                 page.number);
   replace_joints(kept, page.joints, owner);
   kept.epoch = page.epoch;
   note_epoch(partition, page);
@@ -208,73 +218,6 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
     if (stays.count(id) != 0) continue;
     if (claims_.unclaim(std::string(id), owner, number)) --partition.info.frames;
   }
-}
-
-// New tombstones to report. A new participant does not report those from before its start.
-std::vector<Tombstone> Directory::new_tombstones(const Known& partition,
-                                                 const std::vector<Tombstone>& tombstones) {
-  std::vector<Tombstone> fresh;
-  if (partition.page_count == 0 || partition.pages.size() < partition.page_count) return fresh;
-  for (const Tombstone& tombstone : tombstones) {
-    if (tombstone.kind == Tombstone::Kind::kRemoved) continue;
-    const bool known =
-        std::any_of(partition.pages.begin(), partition.pages.end(), [&](const auto& page) {
-          const std::vector<Tombstone>& there = page.second.tombstones;
-          return std::find(there.begin(), there.end(), tombstone) != there.end();
-        });
-    if (!known) fresh.push_back(tombstone);
-  }
-  return fresh;
-}
-
-void Directory::report(const std::vector<Tombstone>& fresh, Owner owner) {
-  for (const Tombstone& tombstone : fresh) {
-    if (tombstone.kind == Tombstone::Kind::kDropped) {
-      report_orphans(tombstone.id, owner);
-    } else if (changes_.watched()) {
-      changes_.add(conflict_of(tombstone, name(owner)));
-    }
-  }
-}
-
-// Owners concerned are informed in any case.
-void Directory::report_orphans(const std::string& dropped, Owner by) {
-  for (const FrameInfo& frame : forest_.waiting_for(dropped)) {
-    const bool concerns = changes_.watched() || frame.owner == kHeldHere || by == kHeldHere;
-    if (concerns) changes_.add(orphan_of(frame, name(frame.owner), name(by)));
-  }
-}
-
-void Directory::find_orphans(const std::vector<Tombstone>& tombstones, Owner owner) {
-  for (const Tombstone& tombstone : tombstones) {
-    saw_lamport_time(tombstone.lamport_time);
-    if (tombstone.kind != Tombstone::Kind::kRemoved) continue;
-    for (const FrameInfo& frame : forest_.waiting_for(tombstone.id)) {
-      if (frame.owner != kHeldHere || frame.lamport_time >= tombstone.lamport_time) continue;
-      orphans_.insert({PendingYield::Kind::kRemove, frame.id, owner, frame.lamport_time});
-    }
-  }
-}
-
-void Directory::find_orphans() {
-  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    for (const auto& [number, page] : partitions_[owner].pages)
-      find_orphans(page.tombstones, owner);
-  }
-}
-
-std::set<PendingYield> Directory::pending_yields() {
-  // Orphans that were removed or moved are resolved, and those whose parent exists again.
-  for (auto orphan = orphans_.begin(); orphan != orphans_.end();) {
-    const auto frame = forest_.info(orphan->frame);
-    const bool stands = frame && frame->owner == kHeldHere &&
-                        frame->lamport_time == orphan->lamport_time &&
-                        !forest_.exists(frame->parent);
-    orphan = stands ? std::next(orphan) : orphans_.erase(orphan);
-  }
-  std::set<PendingYield> all = claims_.pending_yields();
-  all.insert(orphans_.begin(), orphans_.end());
-  return all;
 }
 
 void Directory::saw_lamport_time(std::uint64_t time) {

@@ -101,8 +101,14 @@ class Directory {
   ///   one message would move several robots
   [[nodiscard]] Result<JointRoute> route_joint(const std::string& name) const;
 
-  /// This process released a frame: the claim of another partition may now be in force.
+  /// This process released a frame: the claim of another partition may now be in force. What it has
+  /// said of the frame is noted before.
   void released(const std::string& id) { claims_.released(id); }
+
+  /// A tombstone of this process's partition, instead of an earlier one of that frame; or none any
+  /// more.
+  void note_own(const Tombstone& tombstone);
+  void forget_own_tombstone(const std::string& id) { claims_.forget_removal(id, kHeldHere, 0); }
 
   /// This process moved a frame that it holds: frames of others may now fit below it.
   void moved() { claims_.mend(); }
@@ -117,6 +123,8 @@ class Directory {
   /// What this process's partition would have to yield, according to what was applied so far.
   /// O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields();
+  /// As FrameClaims::removed_before().
+  [[nodiscard]] std::set<PendingYield> removed_before() const { return claims_.removed_before(); }
   /// Whether pending_yields() may be non-empty. O(1).
   [[nodiscard]] bool contested() const { return !orphans_.empty() || claims_.contested(); }
 
@@ -257,6 +265,9 @@ class Directory {
     std::multiset<Owner> movers;  // have a joint of that name, which follows none
     std::multiset<Owner> others;  // have one that follows another, or one that follows this one
   };
+  void put_removals(const Page& page, Owner owner);
+  void erase_removals(const std::vector<Tombstone>& before, const std::vector<Tombstone>& now,
+                      Owner owner, std::uint32_t number);
   void add_joint(const PageJoint& joint, Owner owner);
   void forget_joint(const PageJoint& joint, Owner owner);
   void forget_use(const std::string& name, std::multiset<Owner> JointUse::*part, Owner owner);

@@ -196,6 +196,7 @@ Result<void> Directory::forget(const std::string& partition, std::uint64_t incar
 void Directory::drop_structure(Known& partition, Owner owner) {
   for (auto& [number, page] : partition.pages) {
     unclaim_all_but({}, partition, owner, number);
+    erase_removals(page.tombstones, {}, owner, number);
     replace_joints(page, {}, owner);
   }
   partition.pages.clear();

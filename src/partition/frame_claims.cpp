@@ -50,6 +50,20 @@ FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) {
   return mine != claims->second.end() ? &*mine : nullptr;
 }
 
+bool FrameClaims::is_ended(const std::string& id, const FrameClaim& claim) const {
+  return removals_.find(id, claim.owner, claim.lamport_time, [&](const FrameRemoval& one) {
+    const bool counts = one.by_request || succession_.is_gone(claim.owner);
+    return counts && succession_.survived(one.owner, claim.owner);
+  }) != nullptr;
+}
+
+const FrameClaim* FrameClaims::heir(const std::string& id, Claims claims) const {
+  claims.erase(std::remove_if(claims.begin(), claims.end(),
+                              [&](const FrameClaim* claim) { return is_ended(id, *claim); }),
+               claims.end());
+  return claims.empty() ? nullptr : &succession_.heir(claims);
+}
+
 bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) {
   const auto there = forest_.info(id);
   std::optional<FrameClaim> before;
@@ -59,8 +73,8 @@ bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) 
   const bool late =
       before && before->page != claim.page && before->lamport_time > claim.lamport_time;
   if (late && counts == Counts::kTheYounger) return false;
-  const bool contested =
-      (there && there->owner != claim.owner) || shadowed_.find(id) != shadowed_.end();
+  const bool contested = (there && there->owner != claim.owner) ||
+                         shadowed_.find(id) != shadowed_.end() || removals_.any(id);
   if (!contested) {
     put(id, claim);
     return !before;
@@ -83,18 +97,32 @@ bool FrameClaims::unclaim(const std::string& id, Owner owner, std::uint32_t page
   }
   const auto there = forest_.info(id);
   if (!there || there->owner != owner || page_of(id) != page) return false;
-  const bool last = shadowed_.find(id) == shadowed_.end();
-  if (last) {
-    changes_.frame_removed(id, name(owner));
-    forest_.drop_remote(id, owner);
-  }
   cut_.erase(id);
   promote(id);
   return true;
 }
 
+void FrameClaims::removed(const std::string& id, const FrameRemoval& removal) {
+  if (!removals_.put(id, removal)) return;
+  reconsider(id);
+  doubt(id);
+}
+
+void FrameClaims::forget_removal(const std::string& id, Owner owner, std::uint32_t page) {
+  removals_.erase(id, owner, page);
+  reconsider(id);
+}
+
+// A claim in force that a removal would end if its owner were gone is examined again later.
+void FrameClaims::doubt(const std::string& id) {
+  const auto there = forest_.info(id);
+  const auto any = [](const FrameRemoval&) { return true; };
+  if (there && removals_.find(id, there->owner, there->lamport_time, any) != nullptr)
+    doubted_.insert(id);
+}
+
 void FrameClaims::released(const std::string& id) {
-  promote(id);
+  if (!forest_.exists(id)) promote(id);
   mend();
 }
 
@@ -117,6 +145,7 @@ Owner FrameClaims::holder(const std::string& id) const {
 
 bool FrameClaims::take(const std::string& id) {
   const auto there = forest_.info(id);
+  if (removals_.any(id)) doubted_.insert(id);
   if (!there || there->owner == kHeldHere) return true;
   if (holder(id) != kHeldHere) return false;
   FrameClaim theirs = in_force(*there);
@@ -127,33 +156,52 @@ bool FrameClaims::take(const std::string& id) {
 }
 
 // Puts the winning claim in force, unless this process holds the frame: then its owner must yield.
+// That in force before does not count any more, or is among the shadowed ones.
 void FrameClaims::promote(const std::string& id) {
+  if (forest_.holds(id)) return;
   const auto claims = shadowed_.find(id);
-  if (claims == shadowed_.end() || forest_.holds(id)) return;
-  const FrameClaim heir = succession_.heir(all_of(claims->second));
+  const FrameClaim* next = nullptr;
+  if (claims != shadowed_.end()) next = heir(id, all_of(claims->second));
+  if (next == nullptr) return drop(id);
+  const FrameClaim now = *next;
   auto& others = claims->second;
-  others.erase(std::find_if(others.begin(), others.end(),
-                            [&](const FrameClaim& claim) { return claim.owner == heir.owner; }));
+  others.erase(others.begin() + (next - others.data()));
   if (others.empty()) shadowed_.erase(claims);
-  put(id, heir);
+  put(id, now);
+  doubt(id);
+}
+
+void FrameClaims::drop(const std::string& id) {
+  cut_.erase(id);
+  const auto there = forest_.info(id);
+  if (!there) return;
+  changes_.frame_removed(id, name(there->owner));
+  forest_.drop_remote(id, there->owner);
 }
 
 // Re-evaluates the claims: a partition's standing, or a precedence between partitions, has changed.
 void FrameClaims::reconsider() {
-  std::vector<std::string> contested;
-  contested.reserve(shadowed_.size());
-  for (const auto& [id, claims] : shadowed_) contested.push_back(id);
-  std::sort(contested.begin(), contested.end());
+  std::set<std::string> contested = std::exchange(doubted_, {});
+  for (const auto& [id, claims] : shadowed_) contested.insert(id);
   for (const std::string& id : contested) {
-    const auto there = forest_.info(id);
-    if (!there || there->owner == kHeldHere) continue;
-    const FrameClaim now = in_force(*there);
-    if (succession_.heir(all_of(shadowed_[id], now)).owner == now.owner) continue;
-    shadow(id, now);
-    cut_.erase(id);
-    promote(id);
+    reconsider(id);
+    doubt(id);
   }
   mend();
+}
+
+void FrameClaims::reconsider(const std::string& id) {
+  const auto there = forest_.info(id);
+  if (!there) return promote(id);
+  if (there->owner == kHeldHere) return;
+  const FrameClaim now = in_force(*there);
+  const auto others = shadowed_.find(id);
+  const FrameClaim* next =
+      heir(id, others != shadowed_.end() ? all_of(others->second, now) : Claims{&now});
+  if (next != nullptr && next->owner == now.owner) return;
+  shadow(id, now);
+  cut_.erase(id);
+  promote(id);
 }
 
 void FrameClaims::set_standing(Owner owner, Succession::Standing standing) {
@@ -165,11 +213,15 @@ void FrameClaims::set_outlived(Owner owner, std::set<Owner> outlived) {
 }
 
 bool FrameClaims::contests_held(Owner owner) const {
+  const auto here = [&](const FrameRemoval& one) {
+    return one.owner == kHeldHere && one.by_request && succession_.survived(kHeldHere, owner);
+  };
   return std::any_of(shadowed_.begin(), shadowed_.end(), [&](const auto& known) {
-    const auto& [id, claims] = known;
-    return forest_.holds(id) &&
-           std::any_of(claims.begin(), claims.end(),
-                       [owner](const FrameClaim& claim) { return claim.owner == owner; });
+    const std::string& id = known.first;
+    return std::any_of(known.second.begin(), known.second.end(), [&](const FrameClaim& claim) {
+      return claim.owner == owner &&
+             (forest_.holds(id) || removals_.find(id, owner, claim.lamport_time, here) != nullptr);
+    });
   });
 }
 
@@ -179,11 +231,10 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
     const auto there = forest_.info(id);
     if (!there || there->owner != kHeldHere) continue;
     const FrameClaim own = in_force(*there);
-    const FrameClaim& heir = succession_.heir(all_of(claims, own));
+    const FrameClaim* next = heir(id, all_of(claims, own));
     // Nothing is yielded to an unreachable partition, which may never return.
-    if (heir.owner == kHeldHere || succession_.standing(heir.owner) != Succession::Standing::kThere)
-      continue;
-    all.insert({PendingYield::Kind::kRelease, id, heir.owner, there->lamport_time});
+    if (next == nullptr || next->owner == kHeldHere || !is_there(next->owner)) continue;
+    all.insert({PendingYield::Kind::kRelease, id, next->owner, there->lamport_time});
   }
   for (const auto& [id, claim] : cut_) {
     const Cycle cycle = cycle_of(id, claim);
@@ -193,7 +244,45 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
                   cycle.held->lamport_time});
     }
   }
+  add_removed(all,
+              [this](Owner by) { return is_there(by) && succession_.survived(by, kHeldHere); });
+  add_orphans(all);
   return all;
+}
+
+std::set<PendingYield> FrameClaims::removed_before() const {
+  std::set<PendingYield> all;
+  add_removed(all, [this](Owner by) { return !may_take_from(by); });
+  return all;
+}
+
+template <class Condition>
+void FrameClaims::add_removed(std::set<PendingYield>& all, Condition condition) const {
+  for (const std::string& id : doubted_) {
+    const auto there = forest_.info(id);
+    if (!there || there->owner != kHeldHere) continue;
+    const FrameRemoval* removal = removals_.find(
+        id, kHeldHere, there->lamport_time,
+        [&](const FrameRemoval& one) { return one.by_request && condition(one.owner); });
+    if (removal == nullptr) continue;
+    all.insert({PendingYield::Kind::kRemove, id, removal->owner, there->lamport_time,
+                removal->lamport_time});
+  }
+}
+
+// Held frames that were below a frame whose last claim has ended.
+void FrameClaims::add_orphans(std::set<PendingYield>& all) const {
+  const auto by_request = [](const FrameRemoval& one) { return one.by_request; };
+  for (const auto& [id, claims] : shadowed_) {
+    if (!removals_.any(id) || forest_.exists(id)) continue;
+    for (const FrameInfo& frame : forest_.waiting_for(id)) {
+      if (frame.owner != kHeldHere) continue;
+      const FrameRemoval* one = removals_.find(id, kHeldHere, frame.lamport_time, by_request);
+      if (one == nullptr) continue;
+      all.insert({PendingYield::Kind::kRemove, frame.id, one->owner, frame.lamport_time,
+                  one->lamport_time});
+    }
+  }
 }
 
 void FrameClaims::shadow(const std::string& id, FrameClaim claim) {
@@ -236,17 +325,15 @@ void FrameClaims::put(const std::string& id, const FrameClaim& claim) {
 }
 
 FrameClaims::Cycle FrameClaims::cycle_of(const std::string& id, const FrameClaim& claim) const {
-  const auto there = [this](Owner owner) {
-    return succession_.standing(owner) == Succession::Standing::kThere;
-  };
-  Cycle cycle{{id, claim.parent, claim.owner, false, claim.lamport_time}, {}, there(claim.owner)};
+  Cycle cycle{
+      {id, claim.parent, claim.owner, false, claim.lamport_time}, {}, is_there(claim.owner)};
   for (auto edge = forest_.info(claim.parent); edge && edge->id != id;
        edge = forest_.info(edge->parent)) {
     if (edge->owner == kHeldHere) {
       if (!cycle.held || yields_to(*edge, *cycle.held)) cycle.held = edge;
       continue;
     }
-    cycle.all_there = cycle.all_there && there(edge->owner);
+    cycle.all_there = cycle.all_there && is_there(edge->owner);
     if (yields_to(*edge, cycle.youngest)) cycle.youngest = *edge;
   }
   return cycle;

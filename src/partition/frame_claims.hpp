@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "partition/change_log.hpp"
+#include "partition/frame_removals.hpp"
 #include "partition/succession.hpp"
 #include "tree/forest.hpp"
 
@@ -31,7 +32,7 @@ struct PendingYield {
   enum class Kind : std::uint8_t {
     kRelease,  ///< `rival` has the older claim to the id: release the frame
     kUnhang,   ///< the frame closes a cycle with an earlier move by `rival`: make it a root
-    kRemove,   ///< `rival` removed the frame's parent: remove the frame, too
+    kRemove,   ///< `rival` removed the frame or its parent: remove the frame, too
   };
   Kind kind = Kind::kRelease;
   std::string frame;
@@ -39,6 +40,7 @@ struct PendingYield {
   /// When the frame got its parent. Another frame of that name, or a later move, is a different
   /// case.
   std::uint64_t lamport_time = 0;
+  std::uint64_t removed_at = 0;  ///< Lamport time of the rival's removal, if that is the reason
 
   friend bool operator<(const PendingYield& a, const PendingYield& b) {
     return std::tie(a.kind, a.frame, a.rival, a.lamport_time) <
@@ -49,9 +51,10 @@ struct PendingYield {
 /// Decides which claims are in force, and writes those into the forest. If several partitions claim
 /// a frame, Succession decides. In each cycle of claims the youngest one is cut, and its frame is a
 /// root; claims of partitions that are gone are cut first, and of equally old ones that of the
-/// greater id. So the result is a function of the claims and of which partitions are present, not
-/// of the order in which they came. A held frame stays until its owner yields; participants that do
-/// not own it see the result at once. Not thread-safe.
+/// greater id. If a partition has survived another one and then removes a frame, earlier claims of
+/// the other one have ended, too. So the result is a function of the claims, the removals and of
+/// which partitions are present, not of the order in which they came. A held frame stays until its
+/// owner yields; participants that do not own it see the result at once. Not thread-safe.
 class FrameClaims {
  public:
   FrameClaims(Forest& forest, ChangeLog& changes) : forest_(forest), changes_(changes) {}
@@ -79,6 +82,11 @@ class FrameClaims {
   /// @return whether the claim is gone
   bool unclaim(const std::string& id, Owner owner, std::uint32_t page);
 
+  /// A partition has removed or dropped a frame. O(1).
+  void removed(const std::string& id, const FrameRemoval& removal);
+  /// The page of the partition no longer says that.
+  void forget_removal(const std::string& id, Owner owner, std::uint32_t page);
+
   /// This process released a frame: the claim of another partition may now be in force.
   void released(const std::string& id);
 
@@ -98,12 +106,32 @@ class FrameClaims {
   void mend();
 
   /// Whether any claims exclude each other.
-  [[nodiscard]] bool contested() const { return !shadowed_.empty() || !cut_.empty(); }
+  [[nodiscard]] bool contested() const {
+    return !shadowed_.empty() || !cut_.empty() || !doubted_.empty();
+  }
 
   /// What this process would have to yield now. O(contested frames).
   [[nodiscard]] std::set<PendingYield> pending_yields() const;
+  /// Held frames that a new partition yields, since those present have removed them. As take().
+  [[nodiscard]] std::set<PendingYield> removed_before() const;
 
  private:
+  using Claims = std::vector<const FrameClaim*>;
+
+  /// Whether a partition that has survived its owner has removed the frame since; or has dropped
+  /// it, and the owner is still gone.
+  [[nodiscard]] bool is_ended(const std::string& id, const FrameClaim& claim) const;
+  /// The claim that holds; null: all have ended.
+  [[nodiscard]] const FrameClaim* heir(const std::string& id, Claims claims) const;
+  /// Held frames that others have removed for whom the condition holds.
+  template <class Condition>
+  void add_removed(std::set<PendingYield>& all, Condition condition) const;
+  void add_orphans(std::set<PendingYield>& all) const;
+  void doubt(const std::string& id);
+  void drop(const std::string& id);
+  [[nodiscard]] bool is_there(Owner owner) const {
+    return succession_.standing(owner) == Succession::Standing::kThere;
+  }
   [[nodiscard]] bool may_take_from(Owner owner) const;
   /// Of two edges in a cycle: whether the first one is to be cut rather than the second.
   [[nodiscard]] bool yields_to(const FrameInfo& a, const FrameInfo& b) const;
@@ -113,6 +141,7 @@ class FrameClaims {
   void shadow(const std::string& id, FrameClaim claim);
   void promote(const std::string& id);
   void reconsider();
+  void reconsider(const std::string& id);
   void put(const std::string& id, const FrameClaim& claim);
   void break_cycle(const std::string& id, const FrameClaim& claim);
   void cut(const FrameInfo& frame);
@@ -128,8 +157,12 @@ class FrameClaims {
   Forest& forest_;
   ChangeLog& changes_;
   Succession succession_;
-  // Frames claimed by several partitions: all claims except the one in force.
+  // All claims except those in force: to frames claimed by several partitions, and to frames that
+  // do not exist because others have removed them.
   std::unordered_map<std::string, std::vector<FrameClaim>> shadowed_;
+  FrameRemovals removals_;
+  // Frames with a claim in force that is older than such a removal, perhaps no longer.
+  std::set<std::string> doubted_;
   std::vector<std::uint32_t> page_of_slot_;  // of the claims in force
   // Claims of frames that are roots because they would close a cycle.
   std::map<std::string, FrameClaim> cut_;

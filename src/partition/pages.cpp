@@ -64,20 +64,24 @@ std::optional<PageJoint> Pages::erase_joint(const std::string& id) {
   return joint;
 }
 
-void Pages::leave(const Tombstone& tombstone) {
+std::vector<std::string> Pages::leave(const Tombstone& tombstone) {
   forget_tombstone(tombstone.id);
   const std::uint32_t number = page_with_room();
   page_of_tombstone_.emplace(tombstone.id, number);
   pages_[number].tombstones[tombstone.id] = tombstone;
   changed(number, tombstone.id);
   oldest_tombstones_.emplace_back(tombstone.id, tombstone.lamport_time);
+  std::vector<std::string> dropped;
   while (page_of_tombstone_.size() > kMaxTombstones ||
          oldest_tombstones_.size() > 2 * kMaxTombstones) {
     const auto [id, lamport_time] = std::move(oldest_tombstones_.front());
     oldest_tombstones_.pop_front();
     const auto there = this->tombstone(id);
-    if (there && there->lamport_time == lamport_time) forget_tombstone(id);
+    if (!there || there->lamport_time != lamport_time) continue;
+    forget_tombstone(id);
+    dropped.push_back(id);
   }
+  return dropped;
 }
 
 void Pages::forget_tombstone(const std::string& id) {

@@ -66,7 +66,8 @@ class Pages {
   std::optional<PageJoint> erase_joint(const std::string& id);
 
   /// Sets the tombstone of a frame, instead of an earlier one.
-  void leave(const Tombstone& tombstone);
+  /// @return the frames whose tombstones were dropped for it
+  std::vector<std::string> leave(const Tombstone& tombstone);
 
   [[nodiscard]] std::optional<Place> place(const std::string& id) const;
   [[nodiscard]] std::optional<Tombstone> tombstone(const std::string& id) const;

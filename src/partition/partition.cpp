@@ -211,7 +211,7 @@ Result<void> Partition::remove(const RemoveRequest& request, Time now) {
     }
   }
   directory_.saw_lamport_time(request.lamport_time);
-  forget(removed, now);
+  forget(removed, directory_.next_lamport_time(now));
   return outcome;
 }
 
@@ -232,19 +232,25 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
 
 void Partition::put(const std::string& id, const std::string& parent, std::uint64_t lamport_time) {
   pages_.put(id, parent, lamport_time);
+  directory_.forget_own_tombstone(id);
   directory_.changes().frame_added(id, parent, name_);
+}
+
+void Partition::leave(const Tombstone& tombstone) {
+  for (const std::string& dropped : pages_.leave(tombstone))
+    directory_.forget_own_tombstone(dropped);
+  directory_.note_own(tombstone);
 }
 
 // From the leaves up: tombstones are limited in number, and those of the top frames should last
 // longest.
-void Partition::forget(const std::vector<std::string>& removed, Time now) {
+void Partition::forget(const std::vector<std::string>& removed, LamportTime when) {
   if (removed.empty()) return;
-  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
     consistency_.erase(*id);
     let_go(*id);
     pages_.erase(*id);
-    pages_.leave({*id, lamport_time, Tombstone::Kind::kRemoved, {}});
+    leave({*id, when, Tombstone::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
     directory_.released(*id);
   }

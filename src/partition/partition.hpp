@@ -151,10 +151,11 @@ class Partition {
   [[nodiscard]] Result<void> reconfigure(const StoredState& state,
                                          const std::vector<StoredJoint>& joints,
                                          const std::vector<FrameSpec>& configured, Time now);
-  bool release(const std::string& id);
-  void tell_dropped(const std::string& id, Time now);
+  bool release(const std::string& id, std::optional<LamportTime> dropped = {});
+  void tell_dropped(const std::string& id);
+  void leave(const Tombstone& tombstone);
   void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
-  void forget(const std::vector<std::string>& removed, Time now);
+  void forget(const std::vector<std::string>& removed, LamportTime when);
   void yield_to(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
   void unhang(const std::string& id, Owner rival, Time now);

@@ -67,7 +67,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   for (const StoredFrame* frame : kept) {
     if (!hang_again(*frame)) circular.push_back(frame);
   }
-  for (const Tombstone& tombstone : state.tombstones) pages_.leave(tombstone);
+  for (const Tombstone& tombstone : state.tombstones) leave(tombstone);
   pages_.resume(state.epoch);
   // Only later changes are not in the store.
   saved_ = true;
@@ -79,6 +79,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   for (const StoredFrame* frame : circular) make_root(*frame, now);
   directory_.moved();
   directory_.find_orphans();
+  for (const PendingYield& one : directory_.removed_before()) yield(one, now);
   while (yield(pending_yields(), now)) {
   }
   auto taken = reconfigure(state, joints, configured, now);
@@ -133,7 +134,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
         if (auto said = forest_.correlate(id, entries.at(id)->correlation); !said) return said;
         break;
       case Kind::kRemove:
-        if (release(id)) dropped.push_back(id);
+        if (release(id, directory_.next_lamport_time(now))) dropped.push_back(id);
         break;
       case Kind::kRest:
       case Kind::kOrphan:
@@ -141,15 +142,17 @@ Result<void> Partition::reconfigure(const StoredState& state,
     }
   }
   if (auto taken = take(fresh, directory_.next_lamport_time(now)); !taken) return taken;
-  for (const std::string& id : dropped) tell_dropped(id, now);
+  for (const std::string& id : dropped) tell_dropped(id);
   return {};
 }
 
-// Frames below wait for another frame of that name.
-bool Partition::release(const std::string& id) {
+// Frames below wait for another frame of that name. If it is dropped, others must not remove them,
+// as they do for a tombstone of a removed frame.
+bool Partition::release(const std::string& id, std::optional<LamportTime> dropped) {
   if (!forest_.release(id)) return false;
   let_go(id);
   pages_.erase(id);
+  if (dropped) leave({id, *dropped, Tombstone::Kind::kDropped, {}});
   directory_.released(id);
   return true;
 }
@@ -164,15 +167,13 @@ Result<void> Partition::release(const std::vector<std::string>& ids, Time now) {
                                      quote(name_));
   }
   for (const std::string& id : ids) {
-    if (release(id)) tell_dropped(id, now);
+    if (release(id, directory_.next_lamport_time(now))) tell_dropped(id);
   }
   pages_.close_epoch();
   return {};
 }
 
-// Others must not remove the frames below, as they do for a tombstone of a removed frame.
-void Partition::tell_dropped(const std::string& id, Time now) {
-  pages_.leave({id, directory_.next_lamport_time(now), Tombstone::Kind::kDropped, {}});
+void Partition::tell_dropped(const std::string& id) {
   directory_.changes().frame_removed(id, name_);
   directory_.report_orphans(id, kHeldHere);
 }
@@ -207,7 +208,8 @@ bool Partition::yield(const PendingYield& pending, Time now) {
       unhang(pending.frame, pending.rival, now);
       return true;
     case PendingYield::Kind::kRemove:
-      if (auto removed = forest_.remove(pending.frame)) forget(*removed, now);
+      // As of the rival's removal: it must not end what others have claimed since.
+      if (auto removed = forest_.remove(pending.frame)) forget(*removed, pending.removed_at);
       return true;
   }
   return false;
@@ -234,7 +236,7 @@ void Partition::unhang(const std::string& id, Owner rival, Time now) {
 }
 
 void Partition::tell_conflict(const Tombstone& tombstone) {
-  pages_.leave(tombstone);
+  leave(tombstone);
   directory_.changes().add(conflict_of(tombstone, name_));
 }
 

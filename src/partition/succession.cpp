@@ -40,13 +40,17 @@ bool Succession::outlived(Owner first, Owner second) const {
   return owners_[first].outlived.count(second) != 0 && owners_[second].outlived.count(first) == 0;
 }
 
+bool Succession::survived(Owner first, Owner second) const {
+  return is_gone(first) == is_gone(second) ? outlived(first, second) : is_gone(second);
+}
+
 bool Succession::older(const FrameClaim& a, const FrameClaim& b) const {
   return std::tie(a.lamport_time, name(a.owner)) < std::tie(b.lamport_time, name(b.owner));
 }
 
 const FrameClaim& Succession::heir(const std::vector<const FrameClaim*>& claims) const {
-  const List there = preferred(
-      claims, [this](const FrameClaim* one) { return standing(one->owner) != Standing::kGone; });
+  const List there =
+      preferred(claims, [this](const FrameClaim* one) { return !is_gone(one->owner); });
   const List left = preferred(there, [&](const FrameClaim* one) {
     return std::none_of(there.begin(), there.end(), [&](const FrameClaim* other) {
       return outlived(other->owner, one->owner);

@@ -41,6 +41,9 @@ class Succession {
 
   /// Whether claims of the second do not count against those of the first.
   [[nodiscard]] bool outlived(Owner first, Owner second) const;
+  [[nodiscard]] bool is_gone(Owner owner) const { return standing(owner) == Standing::kGone; }
+  /// By both rules, of two partitions alone.
+  [[nodiscard]] bool survived(Owner first, Owner second) const;
 
   /// @param claims  to one frame, by different owners; at least one
   /// @return the claim that holds

@@ -88,7 +88,7 @@ std::vector<FrameSpec> AbsencesWorld::some_free_frames() {
 }
 
 void AbsencesWorld::start(std::size_t who, bool configured) {
-  const std::vector<FrameSpec> frames = configured ? some_free_frames() : std::vector<FrameSpec>();
+  configured_ = configured ? some_free_frames() : std::vector<FrameSpec>();
   // All serving owners are known, and all their messages were heard.
   auto owner = std::make_unique<LiveOwner>(name(who), ++lives_);
   for (std::size_t other = 0; other < kOwners; ++other) {
@@ -100,7 +100,7 @@ void AbsencesWorld::start(std::size_t who, bool configured) {
   }
   owner->replica.directory.restore(absent_[who]);
   const auto state = stores_[who].load();
-  REQUIRE(owner->partition.restore(*state, frames, now()));
+  REQUIRE(owner->partition.restore(*state, configured_, now()));
   owner->presence = presence_of(name(who), lives_, 0);
   owners_[who] = std::move(owner);
   publish(who);
@@ -157,6 +157,7 @@ void AbsencesWorld::come_back(std::size_t who) {
   if (serves(who)) return;
   run_until_quiet();
   const auto before = claims_of_others(who);
+  const auto gone = removed_frames_of(who);
   const bool hung = there(who);
   if (hung) {
     owners_[who]->hangs = false;
@@ -171,7 +172,16 @@ void AbsencesWorld::come_back(std::size_t who) {
   } else {
     start(who, random_.index(2) == 0);
   }
+  const std::vector<FrameSpec> configured = hung ? std::vector<FrameSpec>() : configured_;
   drain();
+  for (const std::string& id : gone) {
+    const bool added = std::any_of(configured.begin(), configured.end(),
+                                   [&](const FrameSpec& frame) { return frame.id == id; });
+    if (added) continue;
+    INFO("removed frame " << id << " of " << name(who) << (hung ? ", which hung" : ""));
+    REQUIRE_FALSE(spectator_.forest.exists(id));
+    ++counts_.removed;
+  }
   for (const auto& [id, owner] : before) {
     // A partition that hung yields only to owners that know of its absence.
     if (hung && knew_.count(owner) == 0) continue;
@@ -184,28 +194,51 @@ void AbsencesWorld::come_back(std::size_t who) {
 }
 
 std::vector<std::pair<std::string, std::size_t>> AbsencesWorld::claims_of_others(std::size_t who) {
-  std::set<std::string> theirs;
-  if (there(who)) {
-    for (const FrameInfo& frame : owners_[who]->replica.forest.frames()) {
-      if (frame.owner == kHeldHere) theirs.insert(frame.id);
-    }
-  } else {
-    const StoredState stored = *stores_[who].load();
-    for (const StoredFrame& frame : stored.frames) theirs.insert(frame.id);
-  }
+  const auto theirs = claimed_by(who);
   std::vector<std::pair<std::string, std::size_t>> claims;
   for (std::size_t other = 0; other < kOwners; ++other) {
     if (other == who || !serves(other)) continue;
     // If both report the other as lost, the older claim wins.
     const bool mutual = there(who) && misses(who, other);
     if (misses(other, who) && !mutual) knew_.insert(other);
-    for (const std::string& id : theirs) {
+    for (const auto& [id, lamport_time] : theirs) {
       // Only roots: a frame below a removed one may disappear for another reason.
       const auto info = owners_[other]->replica.forest.info(id);
       if (info && info->owner == kHeldHere && info->parent.empty()) claims.emplace_back(id, other);
     }
   }
   return claims;
+}
+
+std::map<std::string, std::uint64_t> AbsencesWorld::claimed_by(std::size_t who) {
+  std::map<std::string, std::uint64_t> claims;
+  if (there(who)) {
+    for (const FrameInfo& frame : owners_[who]->replica.forest.frames()) {
+      if (frame.owner == kHeldHere) claims.emplace(frame.id, frame.lamport_time);
+    }
+    return claims;
+  }
+  const StoredState stored = *stores_[who].load();
+  for (const StoredFrame& frame : stored.frames) claims.emplace(frame.id, frame.lamport_time);
+  return claims;
+}
+
+std::set<std::string> AbsencesWorld::removed_frames_of(std::size_t who) {
+  std::set<std::string> removed;
+  const auto claims = claimed_by(who);
+  for (std::size_t other = 0; other < kOwners; ++other) {
+    const bool knows = other != who && serves(other) && misses(other, who);
+    if (!knows || (there(who) && misses(who, other))) continue;
+    for (const auto& [number, page] : owners_[other]->published) {
+      for (const Tombstone& one : page.tombstones) {
+        const auto claim = claims.find(one.id);
+        const bool ends = one.kind == Tombstone::Kind::kRemoved && claim != claims.end() &&
+                          claim->second < one.lamport_time;
+        if (ends && !spectator_.forest.exists(one.id)) removed.insert(one.id);
+      }
+    }
+  }
+  return removed;
 }
 
 bool AbsencesWorld::misses(std::size_t who, std::size_t whom) const {
@@ -301,6 +334,12 @@ void AbsencesWorld::heard(std::size_t hearer) {
       counts_.inherited += one.kind == ChangeKind::kFrameTakenOver ? 1 : 0;
     }
     return;
+  }
+  // Others have forgotten it although it only hung: it continues as a later process.
+  LiveOwner& owner = *owners_[hearer];
+  if (owner.replica.directory.hidden_by(owner.presence.incarnation)) {
+    owner.presence.incarnation = ++lives_;
+    owner.partition.overtake(lives_);
   }
   // Before anything is given up, the others must have reported all their pages.
   const bool all_heard = std::none_of(queues_.begin(), queues_.end(), [&](const auto& queue) {

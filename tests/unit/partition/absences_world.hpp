@@ -30,6 +30,7 @@ class AbsencesWorld {
   struct Counts {
     std::size_t kept = 0;
     std::size_t inherited = 0;
+    std::size_t removed = 0;
     std::size_t forgotten = 0;
     std::size_t conflicts = 0;
   };
@@ -76,6 +77,10 @@ class AbsencesWorld {
   std::vector<std::string> owned_by_those_there(const Replica& replica) const;
   /// Frames without a reachable owner; some may belong to an unreachable one.
   std::vector<FrameSpec> some_free_frames();
+  /// The frames that an owner holds, or has stored, and when they got their parents.
+  std::map<std::string, std::uint64_t> claimed_by(std::size_t who);
+  /// Those of them that others have removed while it was away.
+  std::set<std::string> removed_frames_of(std::size_t who);
   /// The frames of serving owners that the returning one claims, too.
   std::vector<std::pair<std::string, std::size_t>> claims_of_others(std::size_t who);
 
@@ -104,6 +109,7 @@ class AbsencesWorld {
   std::array<std::unique_ptr<LiveOwner>, kOwners> owners_;
   std::array<MemoryStore, kOwners> stores_;
   std::array<std::vector<Absent>, kOwners> absent_;
+  std::vector<FrameSpec> configured_;  // of the owner that was started last
   std::array<std::uint64_t, kOwners> last_life_{};
   std::set<std::size_t> knew_;
   Replica spectator_;
