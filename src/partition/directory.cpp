@@ -56,7 +56,7 @@ void Directory::apply(const Presence& presence, Time now) {
     // Also of one that was forgotten here: two that have forgotten each other go on as later ones.
     hear_of_itself(presence.absent);
     if (!partitions_[owner].outdated(presence.incarnation)) {
-      hear_absent(owner, presence.absent, now);
+      hear_absent(owner, presence);
     }
   }
   Known& partition = partitions_[owner];
@@ -69,7 +69,8 @@ void Directory::apply(const Presence& presence, Time now) {
   if (drop_outdated(partition, presence.incarnation)) return;
   // An old message of a partition that has stopped since.
   if (partition.info.stopped && partition.live == presence.incarnation) return;
-  partition.live = presence.incarnation;
+  if (std::exchange(partition.live, presence.incarnation) != presence.incarnation)
+    partition.to_forget_all = false;
   if (Successor* successor = succeed(partition, presence.incarnation)) {
     successor->page_count = presence.pages;
     replace_if_complete(partition, owner);
@@ -105,6 +106,7 @@ void Directory::apply(const Page& page) {
     // the time, arrives after a page.
     ++version_;
     partition.live = page.incarnation;
+    partition.to_forget_all = false;
     if (!partition.info.reachable) partition.info.since = Time{};
     came_back(partition, owner);
   }

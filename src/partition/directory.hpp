@@ -232,7 +232,14 @@ class Directory {
     bool forgotten = false;      // up to heard_of
     // Up to this incarnation, once the partition is unreachable here, too.
     std::uint64_t to_forget = 0;
+    // What it has last said that it has forgotten.
+    std::set<std::string> forgets;
+    // When others have forgotten this one, as far as that was heard. Who passes it on does not
+    // change that.
+    std::set<std::int64_t> forgotten_at;
     bool missed_by_others = false;
+    // Others forget it now, perhaps without having heard of `live`.
+    bool to_forget_all = false;
     [[nodiscard]] bool listed() const { return !forgotten && (live != 0 || missed_by_others); }
     std::uint64_t reported = 0;  // the last one dropped as outdated
 
@@ -244,8 +251,10 @@ class Directory {
 
   Known& known(const std::string& partition, Owner& owner);
   [[nodiscard]] std::optional<Owner> number_of(std::string_view partition) const;
-  void hear_absent(Owner from, const std::vector<Absent>& absent, Time now);
-  void hear_of(const Absent& one, const std::string& teller, Time now);
+  void hear_absent(Owner from, const Presence& presence);
+  void hear_of(const Absent& one, const std::string& teller);
+  void hear_forgotten(Known& partition, const Absent& one, bool news);
+  void forget_if_gone(Known& partition, Time since);
   void hear_of_itself(const std::vector<Absent>& absent);
   [[nodiscard]] std::optional<Absent> told_absence(const Known& partition) const;
   bool drop_outdated(Known& partition, std::uint64_t incarnation);

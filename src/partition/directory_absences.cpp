@@ -84,8 +84,10 @@ bool Directory::look_for_gone(Absences::Steady now) {
     if (const auto number = number_of(name)) claims_.set_standing(*number, Standing::kGone);
   }
   const bool news = looked.counts || !looked.gone.empty();
-  if (news) tell_claims();
-  return news;
+  if (!news) return false;
+  tell_claims();
+  for (Known& partition : partitions_) forget_if_gone(partition, partition.info.since);
+  return true;
 }
 
 // Passes on the partitions that this participant has outlived.
@@ -98,17 +100,35 @@ void Directory::tell_claims() {
   claims_.set_outlived(kHeldHere, std::move(outlived));
 }
 
-void Directory::hear_absent(Owner from, const std::vector<Absent>& absent, Time now) {
+void Directory::hear_absent(Owner from, const Presence& presence) {
   std::set<Owner> outlived;
+  std::set<std::string> forgets;
   const std::string teller = partitions_[from].info.name;
-  absences_.told_all(absent, teller);
-  for (const Absent& one : absent) {
+  const bool same_process = partitions_[from].announced == presence.incarnation;
+  absences_.told_all(presence.absent, teller);
+  for (const Absent& one : presence.absent) {
     Owner number = kHeldHere;
     (void)known(one.partition, number);
     // A sender is reachable.
     if (number == from) continue;
     if (Absences::outlived(one.kind)) outlived.insert(number);
-    if (number != kHeldHere) hear_of(one, teller, now);
+    if (number == kHeldHere) continue;
+    if (one.kind != Absent::Kind::kForgotten) {
+      hear_of(one, teller);
+      continue;
+    }
+    forgets.insert(one.partition);
+    auto& known_of = partitions_[number].forgotten_at;
+    const bool is_new = known_of.insert(one.since).second;
+    if (known_of.size() > Absences::kMost) known_of.erase(known_of.begin());
+    hear_forgotten(partitions_[number], one, same_process && is_new);
+  }
+  // It has heard of a later process.
+  for (const std::string& name : std::exchange(partitions_[from].forgets, forgets)) {
+    if (forgets.count(name) != 0) continue;
+    Known& partition = partitions_[refer_to(name)];
+    partition.to_forget = 0;
+    partition.to_forget_all = false;
   }
   claims_.set_outlived(from, std::move(outlived));
 }
@@ -122,22 +142,10 @@ void Directory::hear_of_itself(const std::vector<Absent>& absent) {
   }
 }
 
-void Directory::hear_of(const Absent& one, const std::string& teller, Time now) {
+void Directory::hear_of(const Absent& one, const std::string& teller) {
   Owner number = kHeldHere;
   Known& partition = known(one.partition, number);
-  if (partition.info.reachable) {
-    // A participant that was away itself may notice later that the partition is unreachable.
-    if (one.kind == Absent::Kind::kForgotten) {
-      partition.to_forget = std::max(partition.to_forget, one.incarnation);
-    }
-    return;
-  }
-  if (one.kind == Absent::Kind::kForgotten) {
-    // Others may have heard of a later incarnation.
-    if (one.incarnation >= std::max(partition.live, partition.heard_of))
-      (void)forget(one.partition, one.incarnation, now);
-    return;
-  }
+  if (partition.info.reachable) return;
   // Others may not have heard yet of something that was forgotten here.
   if (partition.forgotten && one.incarnation <= partition.heard_of) return;
   if (one.incarnation < IncarnationSource::kEnd) {
@@ -154,6 +162,31 @@ void Directory::hear_of(const Absent& one, const std::string& teller, Time now) 
   tell_claims();
 }
 
+// @param news  it was forgotten just now
+void Directory::hear_forgotten(Known& partition, const Absent& one, bool news) {
+  const Time since{std::chrono::nanoseconds(one.since)};
+  const std::uint64_t latest = std::max(partition.live, partition.heard_of);
+  if (one.incarnation >= latest && !partition.info.reachable) {
+    (void)forget(partition.info.name, one.incarnation, since);
+    return;
+  }
+  // A participant that was away itself may notice later that the partition is unreachable.
+  if (partition.info.reachable)
+    partition.to_forget = std::max(partition.to_forget, one.incarnation);
+  if (one.incarnation >= latest || !news || partition.live < latest) return;
+  partition.to_forget_all = true;
+  forget_if_gone(partition, since);
+}
+
+// Whoever forgot it may not have heard of its latest process, which was heard here and is gone,
+// too. A process that is silent for a moment only may have been started since.
+void Directory::forget_if_gone(Known& partition, Time since) {
+  if (!partition.to_forget_all || partition.info.reachable) return;
+  const auto absence = absences_.find(partition.info.name);
+  if (absence && absence->kind == Absent::Kind::kSilent) return;
+  (void)forget(partition.info.name, std::max(partition.live, partition.heard_of), since);
+}
+
 void Directory::restore(const std::vector<Absent>& absent) {
   const std::string own = partitions_.front().info.name;
   for (const Absent& one : absent) {
@@ -166,7 +199,11 @@ void Directory::restore(const std::vector<Absent>& absent) {
     const bool forgotten = told.kind == Absent::Kind::kForgotten;
     const bool same = met && partitions_[*number].live <= one.incarnation;
     if (forgotten ? same : !met) absences_.resume(told);
-    hear_of(told, own, Time(std::chrono::nanoseconds(one.since)));
+    if (forgotten) {
+      hear_forgotten(partitions_[refer_to(one.partition)], told, false);
+    } else {
+      hear_of(told, own);
+    }
   }
 }
 
@@ -185,6 +222,7 @@ Result<void> Directory::forget(const std::string& partition, std::uint64_t incar
   const std::uint64_t sound = incarnation < IncarnationSource::kEnd ? incarnation : 0;
   gone.heard_of = std::max({gone.heard_of, gone.live, sound});
   gone.forgotten = true;
+  gone.to_forget_all = false;
   drop_structure(gone, number);
   absences_.forget(partition, gone.heard_of, now);
   claims_.set_standing(number, Standing::kGone);

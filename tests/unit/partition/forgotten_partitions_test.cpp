@@ -12,6 +12,7 @@ namespace tfdude {
 namespace {
 
 using testing::kNow;
+using testing::kStart;
 using testing::page_of;
 using testing::presence_of;
 using testing::Witness;
@@ -90,6 +91,75 @@ TEST_CASE("a partition that is forgotten while it seems reachable is removed whe
   CHECK(base.directory.lost("arm", lives_again ? 2 : 1, kNow));
   CHECK(base.directory.owner("arm").has_value() == lives_again);
   CHECK(base.forest.exists("hand") == lives_again);
+}
+
+TEST_CASE("a partition is forgotten with a later process that only some have heard") {
+  const std::string own = GENERATE("", "head");
+  Witness witness(own);
+  Presence base = presence_of("base", 1, 0);
+  const auto say = [&](std::vector<Absent> absent) {
+    base.absent = std::move(absent);
+    base.pid += 1;
+    witness.directory.apply(base, kNow);
+  };
+  const Absent forgotten{"arm", 0, Kind::kForgotten, 1};
+  say({{"arm", 0, Kind::kLost, 1}});
+  SECTION("the process is gone") {
+    witness.hear("arm", 2, 10);
+    witness.lose("arm", 2);
+    witness.wait();
+    say({forgotten});
+    CHECK_FALSE(witness.directory.owner("arm"));
+    CHECK(witness.owner_of("hand") == "nobody");
+  }
+  SECTION("this is noticed only later") {
+    witness.hear("arm", 2, 10);
+    say({forgotten});
+    CHECK(witness.owner_of("hand") == "arm");
+    const bool withdrawn = GENERATE(false, true);
+    if (withdrawn) say({});
+    witness.lose("arm", 2);
+    CHECK(witness.directory.owner("arm"));
+    CHECK_FALSE(witness.directory.look_for_gone(kStart + Absences::kGrace / 2));
+    CHECK(witness.directory.look_for_gone(kStart + Absences::kGrace));
+    CHECK(witness.directory.owner("arm").has_value() == withdrawn);
+  }
+  SECTION("but not if it is silent for a moment only") {
+    witness.hear("arm", 2, 10);
+    witness.lose("arm", 2);
+    say({forgotten});
+    CHECK(witness.owner_of("hand") == "arm");
+    say({});
+    witness.wait();
+    CHECK(witness.owner_of("hand") == "arm");
+  }
+  SECTION("but not with one that lived after it was forgotten") {
+    CHECK(witness.directory.lost("arm", 1, kNow));
+    say({forgotten});
+    CHECK_FALSE(witness.directory.owner("arm"));
+    witness.hear("arm", 2, 10);
+    say({forgotten});
+    witness.lose("arm", 2);
+    witness.wait();
+    say({forgotten, {"leg", 0, Kind::kLost, 1}});
+    CHECK(witness.owner_of("hand") == "arm");
+  }
+  SECTION("nor by who may have forgotten it before that") {
+    witness.hear("arm", 2, 10);
+    witness.lose("arm", 2);
+    witness.wait();
+    base.incarnation = 2;
+    say({forgotten});
+    CHECK(witness.owner_of("hand") == "arm");
+  }
+  SECTION("nor by those that have only heard of it") {
+    Presence leg = presence_of("leg", 1, 0);
+    leg.absent = {{"arm", 0, Kind::kLost, 2}};
+    CHECK(witness.directory.lost("arm", 1, kNow));
+    witness.directory.apply(leg, kNow);
+    say({forgotten});
+    CHECK(witness.directory.owner("arm"));
+  }
 }
 
 TEST_CASE("an owner that restarts tells a returning partition that it was forgotten") {
