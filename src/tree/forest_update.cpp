@@ -83,13 +83,15 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
   edge.name->refused.more().ahead.fetch_add(1, std::memory_order_relaxed);
   const std::string what =
       "frame " + quote(edge.name->text) + ": the stamp, " + readable(time_of(stamp)) + ", is ";
-  const std::string clock = "the owner's clock, " + readable(time_of(*now));
+  const std::string clock = "the owner's clock";
   if (of_before) {
-    return fail(Errc::kInvalidInput, what + "of the time before " + clock + ", jumped back from " +
-                                         readable(time_of(clock_.before_jump())));
+    return fail(Errc::kInvalidInput, what + "of the time before " + clock + " jumped back from " +
+                                         readable(time_of(clock_.before_jump())) + "; now it is " +
+                                         readable(time_of(*now)));
   }
   return fail(Errc::kInvalidInput, what + in_milliseconds(std::chrono::nanoseconds(ahead)) +
-                                       " ahead of " + clock + ", more than the " +
+                                       " ahead of " + clock + ", " + readable(time_of(*now)) +
+                                       ", more than the " +
                                        in_milliseconds(timing_of(edge).max_ahead) + " allowed");
 }
 

@@ -78,7 +78,8 @@ class Writer {
   }
   [[nodiscard]] std::string age(std::int64_t t) const {
     const std::chrono::nanoseconds ago(nanoseconds(*now_) - t);
-    return ago.count() >= 0 ? readable(ago) + " ago" : "in " + readable(-ago);
+    if (ago.count() == 0) return "now";
+    return ago.count() > 0 ? readable(ago) + " ago" : "in " + readable(-ago);
   }
 
   const std::optional<Time> now_;
