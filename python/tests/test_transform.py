@@ -247,9 +247,10 @@ except ValueError as error:
 def test_texts_do_not_follow_the_locale(tmp_path):
     subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", tmp_path / "de_DE.UTF-8"], check=True)
     environment = {**os.environ, "LOCPATH": str(tmp_path)}
-    text = subprocess.run([sys.executable, "-c", GERMAN], env=environment, check=True, stdout=subprocess.PIPE, text=True)
-    assert "translation=[0.5, 1234.5, 0]" in text.stdout
-    assert "norm 0.5," in text.stdout
+    program = [sys.executable, "-c", GERMAN]
+    text = subprocess.run(program, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
+    assert "translation=[0.5, 1234.5, 0]" in text
+    assert "norm 0.5," in text
 
 
 def test_errors_can_be_pickled():

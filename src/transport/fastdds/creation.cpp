@@ -10,9 +10,20 @@
 namespace tfdude::fastdds {
 namespace {
 
-struct Failing {
-  Mutex mutex;
-  FailCreation fails TFDUDE_GUARDED_BY(mutex);
+class Failing {
+ public:
+  void set(FailCreation fails) {
+    const Lock lock(mutex_);
+    fails_ = std::move(fails);
+  }
+  [[nodiscard]] FailCreation get() {
+    const Lock lock(mutex_);
+    return fails_;
+  }
+
+ private:
+  Mutex mutex_;
+  FailCreation fails_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 Failing& failing() {
@@ -22,17 +33,10 @@ Failing& failing() {
 
 }  // namespace
 
-void fail_creations(FailCreation fails) {
-  const Lock lock(failing().mutex);
-  failing().fails = std::move(fails);
-}
+void fail_creations(FailCreation fails) { failing().set(std::move(fails)); }
 
 bool creation_fails(const std::string& what) {
-  FailCreation fails;
-  {
-    const Lock lock(failing().mutex);
-    fails = failing().fails;
-  }
+  const FailCreation fails = failing().get();
   return fails && fails(what);
 }
 
