@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <utility>
 
 #include "transport/fastdds/cdr_check.hpp"
@@ -357,18 +358,6 @@ wire::State to_wire(const PushedValues& pushed) {
   return sample;
 }
 
-namespace {
-
-void write_beginning(std::uint32_t entry, const Covariance& noise, wire::State& sample) {
-  sample.beginnings().emplace_back();
-  sample.beginnings().back().entry(entry);
-  const Covariance::Upper& upper = noise.upper();
-  if (upper == Covariance::Upper{}) return;
-  sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
-}
-
-}  // namespace
-
 void write_wire(const PushedValues& pushed, wire::State& sample) {
   sample.beginnings().clear();
   sample.correlations().clear();
@@ -378,32 +367,30 @@ void write_wire(const PushedValues& pushed, wire::State& sample) {
   sample.piece(pushed.piece);
   sample.pieces(pushed.pieces);
   sample.entries().resize(pushed.entries.size());
-  // Says that an entry had no sample yet. If there is no room for it, it has no value.
-  const std::size_t most_twice = kMaxItems - std::min(kMaxItems, pushed.entries.size());
-  std::size_t listed_twice = 0;
+  // For beginnings that are listed twice. Without it an edge that had no sample yet has no value.
+  std::size_t room = kMaxItems - std::min(kMaxItems, pushed.entries.size());
   for (std::size_t i = 0; i < pushed.entries.size(); ++i) {
-    sample.entries()[i].index(pushed.entries[i].index);
-    const bool twice = pushed.entries[i].unsampled && listed_twice < most_twice;
-    const bool no_value = pushed.entries[i].cleared || (pushed.entries[i].unsampled && !twice);
-    sample.entries()[i].stamp(no_value ? kClearedStamp : wire_stamp(pushed.entries[i].stamp));
-    sample.entries()[i].history(pushed.entries[i].history);
-    sample.entries()[i].covariance(pushed.entries[i].covariance_number);
-    if (pushed.entries[i].covariance_known) {
-      write_pose(pushed.entries[i].X.pose, sample.entries()[i].x());
-    } else {
-      write_transform(pushed.entries[i].X, sample.entries()[i].x());
+    const PushedValue& entry = pushed.entries[i];
+    const bool twice = entry.unsampled && room > 0;
+    if (twice) --room;
+    const bool no_value = entry.cleared || (entry.unsampled && !twice);
+    sample.entries()[i].index(entry.index);
+    sample.entries()[i].stamp(no_value ? kClearedStamp : wire_stamp(entry.stamp));
+    sample.entries()[i].history(entry.history);
+    sample.entries()[i].covariance(entry.covariance_number);
+    if (entry.covariance_known) write_pose(entry.X.pose, sample.entries()[i].x());
+    if (!entry.covariance_known) write_transform(entry.X, sample.entries()[i].x());
+    for (int times = twice ? 2 : entry.process_noise ? 1 : 0; times > 0; --times) {
+      sample.beginnings().emplace_back();
+      sample.beginnings().back().entry(static_cast<std::uint32_t>(i));
+      if (!entry.process_noise || entry.process_noise->upper() == Covariance::Upper{}) continue;
+      const Covariance::Upper& upper = entry.process_noise->upper();
+      sample.beginnings().back().process_noise().assign(upper.begin(), upper.end());
     }
-    if (twice || pushed.entries[i].process_noise) {
-      const Covariance noise = pushed.entries[i].process_noise.value_or(Covariance());
-      write_beginning(static_cast<std::uint32_t>(i), noise, sample);
-      if (twice) write_beginning(static_cast<std::uint32_t>(i), noise, sample);
-    }
-    listed_twice += twice ? 1 : 0;
-    const Correlation& correlation = pushed.entries[i].correlation;
-    if (correlation.empty()) continue;
+    if (entry.correlation.empty()) continue;
     sample.correlations().emplace_back();
     sample.correlations().back().entry(static_cast<std::uint32_t>(i));
-    sample.correlations().back().edge_correlation(wire_correlation(correlation));
+    sample.correlations().back().edge_correlation(wire_correlation(entry.correlation));
   }
 }
 
