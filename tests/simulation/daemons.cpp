@@ -1,5 +1,6 @@
 #include "simulation/daemons.hpp"
 
+#include <cstdlib>
 #include <utility>
 
 #include "simulation/joints.hpp"
@@ -39,7 +40,16 @@ std::vector<FrameSpec> Daemons::configuration(std::size_t owner) const {
   std::vector<FrameSpec> frames;
   if (owner == 0) frames.push_back({"world", "", {}});
   frames.push_back({base_of(owner), "world", base_edge(owner)});
-  if (cast_.has_extra[owner]) frames.push_back({extra_of(owner), base_of(owner), {}});
+  const Configured& configured = cast_.configured[owner];
+  if (configured.extra) {
+    frames.push_back({extra_of(owner), extra_parent_of(owner, configured, world_.plan.owners), {}});
+  }
+  if (configured.spare == Configured::Spare::kMoved) {
+    frames.push_back(moved_by(spare_joint_of(owner), spare_of(owner), base_of(owner)));
+  } else if (configured.spare == Configured::Spare::kFixed) {
+    frames.push_back({spare_of(owner), base_of(owner), {}});
+  }
+  if (configured.handed) frames.push_back({kHanded, base_of(owner), {}});
   const auto moved = joint_frames_of(owner, world_.plan);
   frames.insert(frames.end(), moved.begin(), moved.end());
   return frames;
@@ -91,6 +101,7 @@ void Daemons::begin(const Fault& fault) {
       return take_down(fault.target, true);
     case FaultKind::kKill:
     case FaultKind::kReconfigure:
+    case FaultKind::kDeputize:
       return take_down(fault.target, false);
     case FaultKind::kPowerLoss:
       take_down(fault.target, false);
@@ -127,7 +138,10 @@ void Daemons::end(const Fault& fault) {
       ++cast_.renamed;
       return bring_up(cast_.wild);
     case FaultKind::kReconfigure:
-      cast_.has_extra[fault.target] = !cast_.has_extra[fault.target];
+      cast_.configured[fault.target].change(static_cast<std::size_t>(std::abs(fault.step.count())));
+      return bring_up(fault.target);
+    case FaultKind::kDeputize:
+      cast_.configured[fault.target].handed = true;
       return bring_up(fault.target);
     case FaultKind::kStop:
     case FaultKind::kKill:

@@ -38,6 +38,9 @@ std::vector<Decision> faults_of(const Plan& plan) {
   for (std::size_t i = 0; i < plan.lasting.size(); ++i) {
     all.push_back({text_of(plan.lasting[i]), [i](Plan& one) { one.lasting[i].left_out = true; }});
   }
+  for (std::size_t i = 0; i < plan.beside.size(); ++i) {
+    all.push_back({text_of(plan.beside[i]), [i](Plan& one) { one.beside[i].left_out = true; }});
+  }
   return all;
 }
 
@@ -59,6 +62,8 @@ std::vector<Decision> decisions_of(const Plan& plan) {
       {with("clients, all but the first of", plan.clients), [](Plan& one) { one.clients = 1; }});
   all.push_back({with("followers", plan.followers), [](Plan& one) { one.followers = 0; }});
   all.push_back({with("samplers", plan.samplers), [](Plan& one) { one.samplers = 0; }});
+  all.push_back({with("waiters", plan.waiters), [](Plan& one) { one.waiters = 0; }});
+  all.push_back({with("streamers", plan.streamers), [](Plan& one) { one.streamers = 0; }});
   all.push_back(
       {with("forgets who is lost:", plan.forgets), [](Plan& one) { one.forgets = false; }});
   for (std::size_t i = 0; i < kOperationKinds; ++i) {
@@ -75,12 +80,18 @@ Plan plan_without(std::uint64_t seed, const std::set<std::size_t>& numbers, Inst
     if (number < decisions.size()) decisions[number].leave_out(plan);
   }
   plan.left_out = numbers;
+  const Instant before = plan.storm;
   plan.storm = std::min(plan.storm, storm);
   for (Fault& fault : plan.faults) {
     fault.left_out = fault.left_out || fault.begin >= plan.storm;
     fault.end = std::min(fault.end, plan.storm);
   }
   for (Fault& fault : plan.lasting) fault.begin = plan.storm;
+  for (Fault& fault : plan.beside) {
+    fault.begin -= before - plan.storm;
+    fault.end -= before - plan.storm;
+    fault.left_out = fault.left_out || fault.begin < Instant(0);
+  }
   return plan;
 }
 

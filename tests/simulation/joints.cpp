@@ -30,6 +30,14 @@ std::vector<MovedFrame> frames_moved_by(std::size_t author, std::size_t owners) 
           {"follow_" + name, "k" + name, (author + 1) % owners, -2, 0.5}};
 }
 
+FrameSpec moved_by(const std::string& joint, const std::string& frame, const std::string& parent) {
+  JointSpec spec;
+  spec.name = joint;
+  spec.type = JointType::kPrismatic;
+  spec.joint = along_z();
+  return {frame, parent, joint_transform(along_z(), 0, 0), {}, {}, spec};
+}
+
 std::vector<FrameSpec> joint_frames_of(std::size_t owner, const Plan& plan) {
   std::vector<FrameSpec> frames;
   for (std::size_t author = 0; author < plan.clients; ++author) {

@@ -29,6 +29,10 @@ struct MovedFrame {
 /// The frame of an author's joint, and that of its follower.
 [[nodiscard]] std::vector<MovedFrame> frames_moved_by(std::size_t author, std::size_t owners);
 
+/// A frame that a joint of its own moves along z, from 0 on.
+[[nodiscard]] FrameSpec moved_by(const std::string& joint, const std::string& frame,
+                                 const std::string& parent);
+
 /// What the configuration of an owner says about joints.
 [[nodiscard]] std::vector<FrameSpec> joint_frames_of(std::size_t owner, const Plan& plan);
 

@@ -65,7 +65,12 @@ constexpr const char* kRare[] = {"a process gave its partition up",
                                  "the clock of a source jumped back",
                                  "sampler: sample too_old",
                                  "a history was restarted",
-                                 "sampled edges checked"};
+                                 "sampled edges checked",
+                                 "waiting lookup done after a while",
+                                 "waiting lookup timeout",
+                                 "streams checked",
+                                 "fault deputize",
+                                 "a deputy's removal was checked"};
 
 using namespace tfdude::simulation;
 

@@ -29,7 +29,10 @@ using FaultWeights = std::array<std::size_t, kFaultKinds>;
 // The possible faults, with their weights; some do not occur in this run.
 FaultWeights draw_fault_weights(Random& random, bool stores) {
   FaultWeights weights{};
-  for (std::size_t& weight : weights) weight = random.index(3) == 0 ? 0 : 1 + random.index(5);
+  constexpr auto kDeputize = static_cast<std::size_t>(FaultKind::kDeputize);  // draw_deputy()
+  for (std::size_t kind = 0; kind < kDeputize; ++kind) {
+    weights.at(kind) = random.index(3) == 0 ? 0 : 1 + random.index(5);
+  }
   weights[0] += 1;
   if (!stores) weights[static_cast<std::size_t>(FaultKind::kFillDisk)] = 0;
   return weights;
@@ -117,12 +120,75 @@ void draw_lasting(Random& random, Plan& plan) {
   }
 }
 
+// Either a daemon that is otherwise well hangs while another one is forgotten. Or that one has been
+// started once more before, which only some clients have heard, and not the one that forgets it.
+void draw_beside(Random& random, Plan& plan) {
+  std::vector<std::size_t> well;
+  for (std::size_t i = 0; i < plan.owners; ++i) {
+    const bool broken =
+        std::any_of(plan.lasting.begin(), plan.lasting.end(), [i](const Fault& fault) {
+          return fault.target == i || (fault.kind == FaultKind::kPart && fault.other == i);
+        });
+    if (!broken) well.push_back(i);
+  }
+  const std::size_t which = random.index(4);
+  if (!plan.forgets || plan.lasting.empty() || which == 0) return;
+  const auto add = [&](FaultKind kind, std::size_t target, Instant begin, Instant end) {
+    Fault fault;
+    fault.kind = kind;
+    fault.target = target;
+    fault.begin = plan.storm + begin;
+    fault.end = plan.storm + end;
+    plan.beside.push_back(fault);
+  };
+  if (which == 1 && well.size() > 1) {
+    return add(FaultKind::kPause, well[random.index(well.size())],
+               between(random, milliseconds(500), milliseconds(4000)),
+               between(random, milliseconds(4100), milliseconds(6000)));
+  }
+  const Fault& out = plan.lasting.front();
+  if (plan.storm < milliseconds(5000) || out.kind != FaultKind::kKill) return;
+  const Instant heard = between(random, milliseconds(200), milliseconds(1500));
+  add(FaultKind::kDeafen, plan.owners, milliseconds(-3600), heard);
+  for (const std::size_t one : well) add(FaultKind::kCut, one, milliseconds(-3600), heard);
+  add(FaultKind::kKill, out.target, milliseconds(-3500), milliseconds(-3000));
+}
+
+// The last owner is down for so long that the first one takes a frame of it over. Nothing else
+// happens to these two then: if the last one returns too early, the first one cannot start.
+void draw_deputy(Random& random, Plan& plan) {
+  const bool deputizes = random.index(3) == 0;
+  const bool stops = random.index(2) == 0;
+  const Instant back = between(random, milliseconds(-1500), milliseconds(0));
+  if (!deputizes || plan.storm < milliseconds(9500)) return;
+  if (!plan.wild_stores || !plan.beside.empty()) return;
+  Fault down;
+  down.kind = stops ? FaultKind::kStop : FaultKind::kKill;
+  down.target = plan.owners - 1;
+  down.begin = plan.storm - milliseconds(8000);
+  down.end = plan.storm + back;
+  Fault deputy;
+  deputy.kind = FaultKind::kDeputize;
+  deputy.begin = down.begin + milliseconds(3500);
+  deputy.end = deputy.begin + milliseconds(300);
+  plan.beside = {down, deputy};
+  const auto disturbs = [&](const Fault& fault) {
+    const bool last = fault.kind == FaultKind::kRename || fault.kind == FaultKind::kReplace;
+    const auto concerns = [&](std::size_t owner) { return owner == 0 || owner == down.target; };
+    const bool either =
+        concerns(fault.target) || (fault.kind == FaultKind::kPart && concerns(fault.other));
+    return (last || either) && fault.end > down.begin - milliseconds(1000);
+  };
+  plan.faults.erase(std::remove_if(plan.faults.begin(), plan.faults.end(), disturbs),
+                    plan.faults.end());
+}
+
 }  // namespace
 
 const char* name_of(FaultKind kind) {
   static constexpr std::array<const char*, kFaultKinds> kNames{
-      "kill", "stop",       "power loss", "pause",   "cut",    "mute",       "deafen",
-      "part", "step clock", "fill disk",  "replace", "rename", "reconfigure"};
+      "kill", "stop",       "power loss", "pause",   "cut",    "mute",        "deafen",
+      "part", "step clock", "fill disk",  "replace", "rename", "reconfigure", "deputize"};
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
@@ -144,6 +210,17 @@ bool Plan::may_lose_power() const {
   return stores && !sync && std::any_of(faults.begin(), faults.end(), [](const Fault& fault) {
            return fault.kind == FaultKind::kPowerLoss && !fault.left_out;
          });
+}
+
+bool Plan::deputizes_in_peace() const {
+  const auto is_left = [](const Fault& fault) { return !fault.left_out; };
+  if (beside.empty() || beside.back().kind != FaultKind::kDeputize) return false;
+  return std::all_of(beside.begin(), beside.end(), is_left) && lasting.empty() &&
+         std::none_of(faults.begin(), faults.end(),
+                      [&](const Fault& fault) {
+                        return is_left(fault) && fault.end > beside.front().begin;
+                      }) &&
+         !may_lose_power() && !may_lack_state(owners - 1);
 }
 
 // One that replaces another has no state, and the other one continues with an older number.
@@ -179,6 +256,10 @@ Plan draw_plan(std::uint64_t seed) {
   draw_faults(random, plan);
   draw_lasting(random, plan);
   plan.samplers = random.index(2);
+  plan.waiters = random.index(2);
+  plan.streamers = random.index(2);
+  draw_beside(random, plan);
+  draw_deputy(random, plan);
   return plan;
 }
 

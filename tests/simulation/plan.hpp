@@ -25,9 +25,10 @@ enum class FaultKind {
   kFillDisk,     ///< fills the disk of a daemon
   kReplace,      ///< a daemon hangs, and another is started in its place; then the first continues
   kRename,       ///< kills a daemon, and starts another partition with its configuration
-  kReconfigure,  ///< kills a daemon, and restarts it with one more frame, or without that frame
+  kReconfigure,  ///< kills a daemon, and restarts it with another configuration
+  kDeputize,     ///< the same, with a frame of the last one, which is down and later returns
 };
-inline constexpr std::size_t kFaultKinds = 13;
+inline constexpr std::size_t kFaultKinds = 14;
 [[nodiscard]] const char* name_of(FaultKind kind);
 
 struct Fault {
@@ -60,6 +61,8 @@ struct Plan {
   std::size_t clients = 1;    ///< clients that own no frames
   std::size_t followers = 0;  ///< clients that read watched paths
   std::size_t samplers = 0;   ///< clients that write stamped samples
+  std::size_t waiters = 0;    ///< clients whose lookups wait
+  std::size_t streamers = 0;  ///< clients that stream what comes and goes
   Instant storm{};            ///< duration of the phase with faults
   double loss = 0;            ///< of datagrams, and of samples that are repeated then
   double repeats = 0;         ///< share of datagrams that arrive twice
@@ -80,6 +83,8 @@ struct Plan {
   /// Owners tell how many others they hear. In runs with faults they do not: no rule depends on it.
   bool tells_count = false;
   bool forgets = false;  ///< a partition that such a fault keeps away is forgotten
+  /// Faults of others at that time, and those that belong together.
+  std::vector<Fault> beside;
   /// The numbers of decisions and of operations that are left out.
   std::set<std::size_t> left_out;
 
@@ -93,12 +98,14 @@ struct Plan {
   }
 
   /// How many make operations that are counted.
-  [[nodiscard]] std::size_t actors() const { return clients + followers + samplers; }
+  [[nodiscard]] std::size_t actors() const { return clients + followers + samplers + waiters; }
   /// For the random numbers of one operation.
   [[nodiscard]] std::uint64_t seed_of(std::size_t actor, std::size_t operation) const;
   [[nodiscard]] bool leaves_out(std::size_t actor, std::size_t operation) const;
   /// Whether stored changes may be lost.
   [[nodiscard]] bool may_lose_power() const;
+  /// Whether a deputy takes something over, and nothing else happens from then on.
+  [[nodiscard]] bool deputizes_in_peace() const;
 
   [[nodiscard]] std::string text() const;
 };

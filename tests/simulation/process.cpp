@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "partition/requests.hpp"
+#include "simulation/cast.hpp"
 
 namespace tfdude::simulation {
 namespace {
@@ -97,10 +98,20 @@ void Process::take_frames() {
   serve();
 }
 
+// Frames of another partition can be taken over only once that is gone.
+bool Process::is_too_early(const Error& error) const {
+  const auto handed = forest_.info(kHanded);
+  return error.code == Errc::kAlreadyExists && handed && handed->owner != kHeldHere;
+}
+
 void Process::serve() {
   std::optional<StoredState> left;
   if (setting_.disk != nullptr) left = setting_.disk->load();
   const auto taken = member_.serve(left ? &*left : nullptr, setting_.configured, wall());
+  if (!taken && is_too_early(taken.error())) {
+    world_.count("a deputy was started too early");
+    return leave();
+  }
   if (!taken) {
     world_.violation("a partition does not serve", partition() + ": " + taken.error().message);
     return leave();
@@ -260,7 +271,18 @@ void Process::react() {
                                    [](const auto& one) { return one->over(); }),
                     operations_.end());
   if (outcome.gave_up) ended_ = true;
+  tell_planned(outcome);
   count(outcome);
+}
+
+void Process::tell_planned(const Outcome& outcome) {
+  if (planned_.empty()) return;
+  const std::uint64_t structure = forest_.structure_version();
+  const Planned::Told told{std::exchange(told_structure_, structure) != structure, outcome.others,
+                           outcome.routes};
+  for (const auto& one : planned_) {
+    if (const auto planned = one.lock()) planned->react(told, world_.violation);
+  }
 }
 
 void Process::count(const Outcome& outcome) {

@@ -17,6 +17,7 @@
 #include "simulation/invariants.hpp"
 #include "simulation/network.hpp"
 #include "simulation/operation.hpp"
+#include "simulation/planned.hpp"
 #include "simulation/pushes.hpp"
 #include "simulation/steps.hpp"
 #include "simulation/watch.hpp"
@@ -41,6 +42,7 @@ struct Surroundings {
   /// The process that serves a partition, for its Node; null: there is none, or it hangs.
   std::function<std::shared_ptr<Process>(const std::string& partition)> serving;
   std::set<std::string> forgotten;  ///< partitions that somebody has forgotten
+  bool handed_removed = false;      ///< the deputy has removed the frame that it had taken over
   /// By each of them, the partitions that have stored that.
   std::map<std::string, std::set<std::string>> forgotten_by;
   Steps& steps;
@@ -112,6 +114,8 @@ class Process : public std::enable_shared_from_this<Process> {
   }
   /// From now on it gets the input for watched paths.
   void watch(const std::shared_ptr<Watch>& watch) { watches_.push_back(watch); }
+  /// From now on it is told what may change its plan.
+  void keep_planned(const std::shared_ptr<Planned>& planned) { planned_.push_back(planned); }
   /// Tells the owner of a partition that a group of watchers has one more member.
   void listen(const std::string& partition, std::uint64_t group);
   /// Whether frames that it does not know do not exist.
@@ -174,10 +178,12 @@ class Process : public std::enable_shared_from_this<Process> {
   void look_at(std::uint64_t peer, Peer& known);
   void show_life(Peer& known);
   void react();
+  void tell_planned(const Outcome& outcome);
   void count(const Outcome& outcome);
   void step_claim();
   void take_frames();
   void serve();
+  [[nodiscard]] bool is_too_early(const Error& error) const;
   [[nodiscard]] Ready take_ready();
   void ask_commit(Instant wait);
   void commit();
@@ -198,6 +204,8 @@ class Process : public std::enable_shared_from_this<Process> {
   std::optional<Presence> presence_;
   std::vector<std::shared_ptr<Operation>> operations_;
   std::vector<std::weak_ptr<Watch>> watches_;
+  std::vector<std::weak_ptr<Planned>> planned_;
+  std::uint64_t told_structure_ = 0;
   Pushes pushes_;
   std::uint64_t pushed_ = 0;
   std::vector<std::function<void()>> backlog_;

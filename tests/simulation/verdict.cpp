@@ -4,6 +4,9 @@
 #include <map>
 #include <set>
 
+#include "simulation/streamer.hpp"
+#include "simulation/waiter.hpp"
+
 namespace tfdude::simulation {
 namespace {
 
@@ -61,18 +64,27 @@ void Verdict::check() {
     for (const std::string& partition : forgotten()) check_forgotten(*one, partition);
   }
   check_owners(*all.back());
+  check_handed(*all.back());
   for (Author* author : authors) check_author(*author);
   if (agreed_) {
     for (Author* author : authors) look_up_all(*author);
   }
   for (const auto& follower : cast_.followers) check_follower(*follower);
   check_samplers();
+  for (const auto& waiter : cast_.waiters) {
+    if (hears_all(waiter->process())) waiter->check();
+  }
+  for (const auto& streamer : cast_.streamers) {
+    if (hears_all(streamer->process())) streamer->check(cast_);
+  }
   await_calls();
   const auto add = [&](const auto& actor) {
     if (hears_all(actor->process())) all.push_back(&actor->process());
   };
   for (const auto& follower : cast_.followers) add(follower);
   for (const auto& sampler : cast_.samplers) add(sampler);
+  for (const auto& waiter : cast_.waiters) add(waiter);
+  for (const auto& streamer : cast_.streamers) add(streamer);
   for (Process* one : all) check_kept(*one);
 }
 
@@ -96,7 +108,8 @@ void Verdict::check_kept_by_owner(Process& owner) {
   };
   const Partition* partition = owner.member().partition();
   if (partition == nullptr) return;
-  const std::size_t clients = cast_.authors.size() + cast_.followers.size() + cast_.samplers.size();
+  const std::size_t clients =
+      cast_.authors.size() + cast_.followers.size() + cast_.samplers.size() + cast_.waiters.size();
   if (partition->kept_replies() > kRepliesPerClient * clients) {
     grows(" keeps " + std::to_string(partition->kept_replies()) + " replies");
   }
@@ -291,15 +304,26 @@ void Verdict::check_owners(Process& one) {
       violation("a configured frame is another's", base_of(i) + " is of " + owner);
     }
     const auto extra = one.forest().info(extra_of(i));
-    if (extra && !cast_.has_extra[i] && is_left_over(*extra, one)) continue;
-    if (extra.has_value() != cast_.has_extra[i]) {
+    const Configured& configured = cast_.configured[i];
+    if (extra && !configured.extra && is_left_over(*extra, one)) continue;
+    if (extra.has_value() != configured.extra) {
       violation("a configuration does not hold",
                 extra_of(i) + (extra ? " is there" : " is missing"));
+    } else if (extra && extra->parent != extra_parent_of(i, configured, plan_.owners)) {
+      violation("a configuration does not hold", extra_of(i) + " is below " + extra->parent);
     } else if (extra && one.directory().name(extra->owner) != cast_.name_of_daemon(i)) {
       violation("a configured frame is another's",
                 extra_of(i) + " is of " + one.directory().name(extra->owner));
     }
   }
+}
+
+// What a deputy has removed does not return with the former owner.
+void Verdict::check_handed(Process& one) {
+  const bool removed = cast_.authors.front()->world().handed_removed;
+  if (!removed || !plan_.deputizes_in_peace()) return;
+  calls_.count("a deputy's removal was checked", 1);
+  if (one.forest().exists(kHanded)) violation("a removed frame is back", kHanded);
 }
 
 // A renamed daemon knows nothing of its frames under the former name, which no daemon serves.

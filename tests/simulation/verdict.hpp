@@ -46,6 +46,7 @@ class Verdict {
   void check_follower(Follower& follower);
   void check_samplers();
   void check_owners(Process& one);
+  void check_handed(Process& one);
   [[nodiscard]] bool is_left_over(const FrameInfo& frame, Process& seen_by) const;
   void check_author(Author& author);
   void look_up_all(Author& author);

@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "simulation/daemons.hpp"
+#include "simulation/streamer.hpp"
 #include "simulation/verdict.hpp"
+#include "simulation/waiter.hpp"
 
 namespace tfdude::simulation {
 namespace {
@@ -37,6 +39,7 @@ class World {
                       },
                       [this](const std::string& partition) { return serving(partition); },
                       {},
+                      false,
                       {},
                       run_.steps,
                       invariants_},
@@ -59,14 +62,19 @@ class World {
     for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
     for (std::size_t i = 0; i < plan_.followers; ++i) start_follower(i);
     for (std::size_t i = 0; i < plan_.samplers; ++i) start_sampler(i);
-    for (const Fault& fault : plan_.faults) {
-      timeline_.at(fault.begin, {"fault"}, [this, &fault] { daemons_.begin(fault); });
-      timeline_.at(fault.end, {"end of fault"}, [this, &fault] { daemons_.end(fault); });
+    for (std::size_t i = 0; i < plan_.waiters; ++i) start_waiter();
+    for (std::size_t i = 0; i < plan_.streamers; ++i) start_streamer();
+    for (const auto* faults : {&plan_.faults, &plan_.beside}) {
+      for (const Fault& fault : *faults) {
+        timeline_.at(fault.begin, {"fault"}, [this, &fault] { daemons_.begin(fault); });
+        timeline_.at(fault.end, {"end of fault"}, [this, &fault] { daemons_.end(fault); });
+      }
     }
     advance(plan_.storm);
     for (const auto& author : cast_.authors) author->stop();
     for (const auto& follower : cast_.followers) follower->stop();
     for (const auto& sampler : cast_.samplers) sampler->stop();
+    for (const auto& waiter : cast_.waiters) waiter->stop();
     network_.set_loss(plan_.loss_after);
     for (const Fault& fault : plan_.lasting) daemons_.begin(fault);
     if (plan_.forgets) {
@@ -86,6 +94,7 @@ class World {
     for (const auto& author : cast_.authors) add_outcomes(*author);
     for (const auto& follower : cast_.followers) add_outcomes(*follower);
     for (const auto& sampler : cast_.samplers) add_outcomes(*sampler);
+    for (const auto& waiter : cast_.waiters) add_outcomes(*waiter);
     run_.duration = timeline_.now();
     return std::move(run_);
   }
@@ -131,7 +140,7 @@ class World {
 
   // How many frames anybody has tried to add, including those of the configurations.
   [[nodiscard]] std::size_t frames_named() const {
-    std::size_t named = 1 + 2 * plan_.owners + kContested + 2 * plan_.clients;
+    std::size_t named = 2 + 3 * plan_.owners + kContested + 2 * plan_.clients;
     for (const auto& author : cast_.authors) named += author->added();
     for (const auto& follower : cast_.followers) named += follower->added();
     for (const auto& sampler : cast_.samplers) named += sampler->added();
@@ -178,6 +187,16 @@ class World {
     cast_.samplers.push_back(
         std::make_shared<Sampler>(start_client(), number, actors_++, cast_.wild));
     cast_.samplers.back()->start();
+  }
+
+  void start_waiter() {
+    cast_.waiters.push_back(std::make_shared<Waiter>(start_client(), actors_++));
+    cast_.waiters.back()->start();
+  }
+
+  void start_streamer() {
+    cast_.streamers.push_back(std::make_shared<Streamer>(start_client()));
+    cast_.streamers.back()->start();
   }
 
   void lost_power(const std::string& partition, Instant first) {
