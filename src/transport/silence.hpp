@@ -53,9 +53,8 @@ struct Silence {
 inline constexpr std::chrono::milliseconds kProbeAfter{100};
 
 /// Judges a server that did not count as lost before. The silence of one that is needed begins when
-/// it is needed: earlier, nobody asked it. One that is needed and has not replied yet is asked even
-/// if it is heard: who only streams to it hears acknowledgements, which end with it, but not that it
-/// receives requests.
+/// it is needed: earlier, nobody asked it. One that has not replied yet is asked even if it is
+/// heard: acknowledgements of a stream do not show that it receives requests.
 [[nodiscard]] inline Silence judge(const Hearing& heard, const Patience& patience,
                                    Hearing::Time now) {
   const bool needed = heard.needed_since.has_value();

@@ -83,7 +83,8 @@ int run(const Arguments& arguments) {
   check_all("after a restart of all", cluster, observer.client(), workers, journal);
   std::printf("%s", journal.counts().c_str());
   // The observer does not depend on a daemon that it does not ask.
-  report_time("from a daemon's death until it counts as gone", observer.until_gone(), 2100, journal);
+  report_time("from a daemon's death until it counts as gone", observer.until_gone(), 2100,
+              journal);
   report_time("from a daemon's start until it answers", observer.until_answer(), 2000, journal);
   std::printf("seed %llu: %zu violations\n", static_cast<unsigned long long>(arguments.seed),
               journal.violations());

@@ -14,8 +14,8 @@
 namespace tfdude::faults {
 
 /// Two clients that go on across deaths and returns. One always has a lookup of a frame of each
-/// partition that waits for ten minutes: it must be answered once all owners are back. The other one
-/// streams to these frames through one stream: without faults all of it must be sent, and arrive.
+/// partition that waits for ten minutes: it must be answered once all owners are back. The other
+/// one streams to these frames through one stream: without faults all must be sent, and arrive.
 class Waiter {
  public:
   Waiter(Client waiting, Client streaming, std::size_t partitions, Journal& journal);

@@ -14,7 +14,6 @@ class Planned {
   /// What an input has changed, as the process is told.
   struct Told {
     bool structure = false;  ///< the frames: lookups that wait hear of each commit
-    bool others = false;     ///< as of Outcome
     bool routes = false;     ///< as of Outcome
   };
 

@@ -278,8 +278,7 @@ void Process::react() {
 void Process::tell_planned(const Outcome& outcome) {
   if (planned_.empty()) return;
   const std::uint64_t structure = forest_.structure_version();
-  const Planned::Told told{std::exchange(told_structure_, structure) != structure, outcome.others,
-                           outcome.routes};
+  const Planned::Told told{std::exchange(told_structure_, structure) != structure, outcome.routes};
   for (const auto& one : planned_) {
     if (const auto planned = one.lock()) planned->react(told, world_.violation);
   }

@@ -40,7 +40,7 @@ class Waiter : public Planned, public std::enable_shared_from_this<Waiter> {
 
   [[nodiscard]] std::string plan() const override;
   [[nodiscard]] bool hears(const Told& told) const override {
-    return waits_ && (told.structure || told.others);
+    return waits_ && (told.structure || told.routes);
   }
   [[nodiscard]] std::string name() const override { return "a lookup of " + frame_; }
   void renew() override;

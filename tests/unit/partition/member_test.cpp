@@ -361,9 +361,9 @@ TEST_CASE("a partition that returns with a page first is told to whoever waits o
   client.on_presence(presence_of("arm", 1, 1), kThen);
   client.on_page({"arm", 0, 1, 2, {{"hand", "", 10}}});
   client.on_lost("arm", 1, kThen);
-  CHECK(client.take_outcome().others);
+  CHECK(client.take_outcome().routes);
   client.on_page({"arm", 0, 2, 3, {{"hand", "", 10}, {"tool", "hand", 10}}});
-  CHECK(client.take_outcome().others);
+  CHECK(client.take_outcome().routes);
   client.on_presence(presence_of("arm", 2, 1), kThen);
   REQUIRE(replica.forest.exists("tool"));
   CHECK(client.take_outcome().routes);
