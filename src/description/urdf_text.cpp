@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cstring>
-#include <locale>
-#include <sstream>
+#include <optional>
 #include <string_view>
 #include <tinyxml2.h>
 
@@ -71,12 +71,16 @@ int infinity_of(const std::string& text) {
 }
 
 // The quaternion x y z w of an <origin>.
-std::optional<Eigen::Quaterniond> quaternion_of(const std::string& text) {
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
+std::optional<Eigen::Quaterniond> quaternion_of(std::string_view text) {
+  constexpr std::string_view kBlanks = " \t\r\n";
   Eigen::Vector4d xyzw;
-  for (double& number : xyzw) stream >> number;
-  if (!stream || !(stream >> std::ws).eof()) return std::nullopt;
+  for (double& number : xyzw) {
+    text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (code != std::errc()) return std::nullopt;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  }
+  if (text.find_first_not_of(kBlanks) != std::string_view::npos) return std::nullopt;
   return Eigen::Quaterniond(xyzw);
 }
 
