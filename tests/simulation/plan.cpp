@@ -159,6 +159,7 @@ void draw_beside(Random& random, Plan& plan) {
 void draw_deputy(Random& random, Plan& plan) {
   const bool deputizes = random.index(3) == 0;
   const bool stops = random.index(2) == 0;
+  const bool in_peace = random.index(2) == 0;
   const Instant back = between(random, milliseconds(-1500), milliseconds(0));
   if (!deputizes || plan.storm < milliseconds(9500)) return;
   if (!plan.wild_stores || !plan.beside.empty()) return;
@@ -177,8 +178,14 @@ void draw_deputy(Random& random, Plan& plan) {
     const auto concerns = [&](std::size_t owner) { return owner == 0 || owner == down.target; };
     const bool either =
         concerns(fault.target) || (fault.kind == FaultKind::kPart && concerns(fault.other));
-    return (last || either) && fault.end > down.begin - milliseconds(1000);
+    const bool ends_before = fault.end <= down.begin - milliseconds(1000);
+    if (in_peace) return !ends_before || fault.kind == FaultKind::kPowerLoss || last;
+    return (last || either) && !ends_before;
   };
+  if (in_peace) {
+    plan.lasting.clear();
+    plan.forgets = false;
+  }
   plan.faults.erase(std::remove_if(plan.faults.begin(), plan.faults.end(), disturbs),
                     plan.faults.end());
 }
