@@ -91,6 +91,7 @@ class Calm {
                       [](std::size_t, std::size_t) {},
                       [](const std::string&) { return std::shared_ptr<Process>(); },
                       {},
+                      false,
                       {},
                       steps_,
                       invariants_} {

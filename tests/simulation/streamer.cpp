@@ -23,16 +23,22 @@ class Link final : public Channel<Message> {
   const std::string to_;
 };
 
-/// @param owners_of  of the edge or joint of this name
-template <class Message, class OwnersOf>
-SenderLinks<Message> links_of(Process& process, OwnersOf owners_of) {
+/// @param route_of  of the edge or joint of this name
+template <class Message, class RouteOf>
+SenderLinks<Message> links_of(Process& process, RouteOf route_of) {
   SenderLinks<Message> links;
-  links.find = [&process, owners_of](const std::vector<std::string>& names) {
-    std::vector<std::vector<Destination>> found(names.size());
+  links.find = [&process, route_of](const std::vector<std::string>& names) {
+    std::vector<Destinations> found(names.size());
     for (std::size_t i = 0; i < names.size(); ++i) {
-      for (const Owner owner : owners_of(names[i])) {
+      const Result<Directory::JointRoute> route = route_of(names[i]);
+      if (!route) {
+        found[i].none = route.error().code;
+        continue;
+      }
+      found[i].name = route->name;
+      for (const Owner owner : route->owners) {
         const Directory& directory = process.directory();
-        found[i].push_back({owner, directory.name(owner), directory.reachable(owner)});
+        found[i].to.push_back({owner, directory.name(owner), directory.reachable(owner)});
       }
     }
     return found;
@@ -58,11 +64,13 @@ Streamer::Streamer(std::shared_ptr<Process> process) : process_(std::move(proces
   edges_ = std::make_shared<Stream<Update>>(
       own, edges, links_of<Update>(own, [&own](const std::string& id) {
         const auto frame = own.forest().info(id);
-        return frame ? std::vector<Owner>{frame->owner} : std::vector<Owner>{};
+        using Route = Directory::JointRoute;
+        return frame ? Result<Route>(Route{id, {frame->owner}})
+                     : Result<Route>(fail(Errc::kUnknownFrame, "no frame " + id));
       }));
   joints_ = std::make_shared<Stream<JointUpdate>>(
       own, joints, links_of<JointUpdate>(own, [&own](const std::string& name) {
-        return own.directory().joint_owners(name);
+        return own.directory().route_joint(name);
       }));
 }
 

@@ -42,9 +42,9 @@ class Stream : public Planned, public std::enable_shared_from_this<Stream<Messag
  private:
   [[nodiscard]] std::string plan() const override {
     std::string text;
-    for (const auto& owners : find_(names_)) {
+    for (const Destinations& owners : find_(names_)) {
       text += text.empty() ? "" : ", ";
-      for (const Destination& one : owners)
+      for (const Destination& one : owners.to)
         text += one.partition + (one.reachable ? " " : " (gone) ");
     }
     return text;
@@ -57,7 +57,7 @@ class Stream : public Planned, public std::enable_shared_from_this<Stream<Messag
 
   Process& process_;
   const std::vector<std::string> names_;
-  const std::function<std::vector<std::vector<Destination>>(const std::vector<std::string>&)> find_;
+  const std::function<std::vector<Destinations>(const std::vector<std::string>&)> find_;
   std::shared_ptr<Sender<Message>> sender_;
 };
 
