@@ -124,6 +124,11 @@ Result<Graph> graph_of(Source source, const Arguments& arguments) {
       graph.edges[joint.frame].joint = joint.name;
     }
   }
+  std::map<std::string, PartitionInfo*> owners;  // by frame
+  for (const Frame& frame : graph.frames) {
+    const auto owner = by_name.find(frame.partition);
+    if (owner != by_name.end()) owners[frame.id] = owner->second;
+  }
   for (const Frame& frame : graph.frames) {
     const auto owner = by_name.find(frame.partition);
     if (!frame.attached || owner == by_name.end() || !owner->second->reachable) continue;
@@ -131,7 +136,10 @@ Result<Graph> graph_of(Source source, const Arguments& arguments) {
     if (X_PC) {
       graph.edges[frame.id].covariance = X_PC->covariance;
     } else if (X_PC.error().code == Errc::kTimeout || X_PC.error().code == Errc::kUnreachable) {
-      owner->second->reachable = false;
+      // The parent may be the frame that cannot be looked up.
+      const auto above = owners.find(frame.parent);
+      const bool by_owner = above == owners.end() || above->second->reachable;
+      if (by_owner) owner->second->reachable = false;
     }
   }
   return graph;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <string_view>
@@ -77,7 +78,7 @@ std::optional<Eigen::Quaterniond> quaternion_of(std::string_view text) {
   for (double& number : xyzw) {
     text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
     const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (code != std::errc()) return std::nullopt;
+    if (code != std::errc() || !std::isfinite(number)) return std::nullopt;
     text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   }
   if (text.find_first_not_of(kBlanks) != std::string_view::npos) return std::nullopt;

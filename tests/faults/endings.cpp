@@ -68,9 +68,10 @@ struct Owners {
 
 void run_program(const Owners& owners, std::size_t number, Journal& journal) {
   const std::string position = std::to_string(0.001 * static_cast<double>(number % 1000));
-  Process program = owners.domain.start_cli({"--timeout", "20000", "joint", "elbow", position});
+  Process program = owners.domain.start_cli(
+      {"--timeout", "20000", "joint", "arm/elbow=" + position, "observer/elbow=" + position});
   const auto result = testing::finish(program);
-  if (result.status == 0 && result.out.rfind("moved elbow to ", 0) == 0) return;
+  if (result.status == 0 && result.out.rfind("moved ", 0) == 0) return;
   journal.violation("program " + std::to_string(number) + " ended with status " +
                     std::to_string(result.status) + " after it wrote: " + result.out + result.err);
 }

@@ -93,10 +93,16 @@ TEST_CASE("cli: queries are answered as JSON") {
   const ThesisDaemons d;
   const json frames = object(d, {"frames"}).at("frames");
   REQUIRE(frames.size() == 9);
-  CHECK(frames[0] ==
-        json({{"id", "arm_1"}, {"parent", "robot_1"}, {"partition", "arms"}, {"attached", true}}));
-  CHECK(frames[8] ==
-        json({{"id", "world"}, {"parent", nullptr}, {"partition", "robot"}, {"attached", false}}));
+  CHECK(frames[0] == json({{"id", "arm_1"},
+                           {"parent", "robot_1"},
+                           {"partition", "arms"},
+                           {"attached", true},
+                           {"reachable", true}}));
+  CHECK(frames[8] == json({{"id", "world"},
+                           {"parent", nullptr},
+                           {"partition", "robot"},
+                           {"attached", false},
+                           {"reachable", true}}));
   CHECK(object(d, {"tree"}).at("frames") == frames);
   const json partitions = object(d, {"partitions"}).at("partitions");
   REQUIRE(partitions.size() == 2);
@@ -213,9 +219,12 @@ TEST_CASE("cli: answers have colours and wide tables on a terminal only") {
   CHECK_THAT(on_terminal("", "lookup world nowhere"), ContainsSubstring(escape + "31mtfdude:"));
   // The column of names has 22 of 80 columns, and 33 of 120.
   (void)text(d, {"update", std::string(30, 'n'), "--xyz", "1", "0", "0", "--stamp", "-1"});
-  CHECK_THAT(text(d, {"monitor", "--once"}), !ContainsSubstring(std::string(30, 'n')));
+  CHECK_THAT(on_terminal("stty cols 80; ", "monitor --once"),
+             !ContainsSubstring(std::string(30, 'n')));
   CHECK_THAT(on_terminal("stty cols 120; ", "monitor --once"),
              ContainsSubstring(std::string(30, 'n')));
+  // What is no terminal has no width.
+  CHECK_THAT(text(d, {"monitor", "--once"}), ContainsSubstring(std::string(30, 'n')));
 }
 
 TEST_CASE("cli: every command has help with an example") {

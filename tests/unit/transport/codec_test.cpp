@@ -268,7 +268,7 @@ const std::vector<BadValue> kBadValues{
     {7, kNan, "covariance[0][0]"},
     {8, kInfinity, "covariance[0][1]"},
     {7, -1.0, "covariance[0][0] is a negative variance"},
-    {27, 1.1e18, "covariance[5][5] is beyond"},
+    {27, 1.1e18, "covariance[5][5] is 1.1e+18, which is beyond 1e18"},
     {8, 1.0, "covariance[0][1] is larger than its variances allow"},
 };
 
