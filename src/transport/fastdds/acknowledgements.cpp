@@ -52,8 +52,9 @@ void Acknowledgements::heard(const std::uint8_t* datagram, std::size_t size) {
     const std::uint64_t missing = high << 32U | number_at(submessage + kMissingAt + 4, 4, little);
     {
       const Lock lock(mutex_);
-      std::uint64_t& known = missing_[key];
-      known = std::max(known, missing);
+      const auto known = missing_.find(key);
+      if (known == missing_.end()) return;
+      known->second = std::max(known->second, missing);
     }
     changed_.notify_all();
   });
@@ -62,11 +63,11 @@ void Acknowledgements::heard(const std::uint8_t* datagram, std::size_t size) {
 bool Acknowledgements::wait_until(const PeerId& reader, const WriterId& writer,
                                   std::uint64_t number, Deadline deadline) {
   Lock lock(mutex_);
+  // Strangers may send any number of others.
+  const auto known = missing_.try_emplace({reader, writer}, 0).first;
   ++waiting_;
-  const bool acknowledged = changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) {
-    const auto known = missing_.find({reader, writer});
-    return known != missing_.end() && known->second > number;
-  });
+  const bool acknowledged =
+      changed_.wait_until(lock, deadline, [&] { return known->second > number; });
   if (--waiting_ == 0) missing_.clear();
   return acknowledged;
 }

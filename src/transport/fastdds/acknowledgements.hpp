@@ -39,7 +39,8 @@ class Acknowledgements {
   std::atomic<int> waiting_{0};
   Mutex mutex_;
   Condition changed_;
-  std::map<Key, std::uint64_t> missing_ TFDUDE_GUARDED_BY(mutex_);  // the first that is missing
+  // The first that is missing, of those that are waited for.
+  std::map<Key, std::uint64_t> missing_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds

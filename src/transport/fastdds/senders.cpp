@@ -128,7 +128,7 @@ Result<void> Senders::flush(Deadline deadline) {
   return outcome;
 }
 
-// Looks again and again who is there, because an owner may be lost, or return, meanwhile.
+// Checks the owner repeatedly, because it may be lost, or return, meanwhile.
 Result<void> Senders::flush(Writer& stream, const std::string& partition, Deadline deadline) {
   const Writer::Mark mark = stream.mark();  // what is written meanwhile is left to the next flush
   const auto gone = [this](const PeerId& peer) { return parts_.peers.replaced(peer); };
