@@ -20,6 +20,7 @@ namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::Approx;
 using testing::ContainsSubstring;
 using testing::following;
 using testing::moved_by;
