@@ -50,6 +50,13 @@ void Absences::told_all(const std::vector<Absent>& absent, const std::string& te
   }
 }
 
+void Absences::teller_restarted(const std::string& teller) {
+  for (auto& [name, missed] : missed_) {
+    const bool open = missed.teller == teller && missed.then == Absent::Kind::kSilent;
+    if (open) missed.then = Absent::Kind::kLost;
+  }
+}
+
 void Absences::heard_of(const std::string& partition, std::uint64_t incarnation) {
   const auto there = missed_.find(partition);
   if (there == missed_.end() || there->second.absent.kind == Absent::Kind::kForgotten) return;

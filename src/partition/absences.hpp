@@ -47,6 +47,9 @@ class Absences {
   /// The complete list of those that the teller misses now. A silence that it no longer reports is
   /// over.
   void told_all(const std::vector<Absent>& absent, const std::string& teller);
+  /// The teller was restarted, so it cannot say what has become of the silences that it reported:
+  /// they count as losses.
+  void teller_restarted(const std::string& teller);
   /// A later incarnation of a missed partition was heard of.
   void heard_of(const std::string& partition, std::uint64_t incarnation);
   /// The partition was missed when this process's predecessor ended.

@@ -105,6 +105,8 @@ void Directory::hear_absent(Owner from, const Presence& presence) {
   std::set<std::string> forgets;
   const std::string teller = partitions_[from].info.name;
   const bool same_process = partitions_[from].announced == presence.incarnation;
+  // Only the process that reported a silence knows that it is over.
+  if (!same_process) absences_.teller_restarted(teller);
   absences_.told_all(presence.absent, teller);
   for (const Absent& one : presence.absent) {
     Owner number = kHeldHere;

@@ -208,7 +208,7 @@ void Author::forget(const std::string& partition) {
         const bool known = process.discovered() && directory.owner(partition);
         if (!known) return fail(Errc::kUnknownPartition, "no partition " + partition);
         if (auto ok = directory.check_not_there(partition); !ok) return tl::unexpected(ok.error());
-        process.world().forgotten.insert(partition);
+        process.world().forgotten[partition] = process.world().timeline.now();
         const ForgetRequest body{partition, directory.latest_incarnation(partition)};
         std::vector<Part> all;
         for (const Owner one : directory.reachable_owners()) {

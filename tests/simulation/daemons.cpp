@@ -81,6 +81,8 @@ void Daemons::look_after() {
     const bool awaits = i == cast_.wild && replaced_;
     if (!cast_.daemons[i] || !cast_.daemons[i]->ended() || down_[i] > 0 || awaits) continue;
     world_.count("daemon ended by itself");
+    // The former owner of the frame may have returned meanwhile.
+    if (cast_.daemons[i]->came_too_early()) cast_.configured[i].handed = false;
     cast_.daemons[i].reset();
     start(i, disk_of(i));
   }

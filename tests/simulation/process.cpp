@@ -110,6 +110,7 @@ void Process::serve() {
   const auto taken = member_.serve(left ? &*left : nullptr, setting_.configured, wall());
   if (!taken && is_too_early(taken.error())) {
     world_.count("a deputy was started too early");
+    too_early_ = true;
     return leave();
   }
   if (!taken) {

@@ -41,10 +41,10 @@ struct Surroundings {
   std::function<void(std::size_t actor, std::size_t operation)> did;
   /// The process that serves a partition, for its Node; null: there is none, or it hangs.
   std::function<std::shared_ptr<Process>(const std::string& partition)> serving;
-  std::set<std::string> forgotten;  ///< partitions that somebody has forgotten
-  bool handed_removed = false;      ///< the deputy has removed the frame that it had taken over
-  /// By each of them, the partitions that have stored that.
-  std::map<std::string, std::set<std::string>> forgotten_by;
+  std::map<std::string, Instant> forgotten;  ///< partitions, and when somebody last forgot them
+  bool handed_removed = false;  ///< the deputy has removed the frame that it had taken over
+  /// For each of them, the partitions that have stored that, and when they stored which news of it.
+  std::map<std::string, std::map<std::string, std::pair<std::int64_t, Instant>>> forgotten_by;
   Steps& steps;
   Invariants& invariants;
 };
@@ -130,6 +130,8 @@ class Process : public std::enable_shared_from_this<Process> {
   [[nodiscard]] bool serves_or_claims() const { return !setting_.partition.empty(); }
   [[nodiscard]] bool serves() const { return serving_; }
   [[nodiscard]] bool ended() const { return ended_; }
+  /// Whether it has ended because a frame of its configuration is still another's.
+  [[nodiscard]] bool came_too_early() const { return too_early_; }
   [[nodiscard]] std::vector<Sample> published() const;
   [[nodiscard]] Forest& forest() { return forest_; }
   [[nodiscard]] const Forest& forest() const { return forest_; }
@@ -222,6 +224,7 @@ class Process : public std::enable_shared_from_this<Process> {
   int pauses_ = 0;
   bool serving_ = false;
   bool ended_ = false;
+  bool too_early_ = false;
   bool committing_ = false;
   bool commit_asked_ = false;
   bool values_due_ = false;

@@ -62,7 +62,8 @@ void Process::perform(const Ready& ready) {
   if (stored && ready.rows.absent) {
     for (const Absent& one : *ready.rows.absent) {
       if (one.kind != Absent::Kind::kForgotten) continue;
-      world_.forgotten_by[one.partition].insert(partition());
+      auto& stored_last = world_.forgotten_by[one.partition][partition()];
+      if (stored_last.first != one.since) stored_last = {one.since, world_.timeline.now()};
     }
   }
   if (stored || ready.refused) {

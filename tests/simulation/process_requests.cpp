@@ -119,7 +119,7 @@ Reply Process::answer(const Request& request) {
 }
 
 Result<void> Process::forget(const std::string& partition) {
-  world_.forgotten.insert(partition);
+  world_.forgotten[partition] = world_.timeline.now();
   auto forgotten = member_.forget(partition, wall());
   react();
   return forgotten;

@@ -155,18 +155,22 @@ bool Verdict::lacks_one(Process& client) const {
   return false;
 }
 
-// Whether some daemon must have told a partition that it was forgotten: this is in its file. Then
+// Whether some daemon must have told a partition that it was last forgotten: that is in its file. Then
 // the partition has continued as a later process, whose pages all get.
 bool Verdict::is_told_by_one(const std::string& partition) const {
   if (cast_.standing(partition) != Cast::Standing::kCore) return false;
   const Author& author = *cast_.authors.front();
   const auto& by = author.world().forgotten_by;
   const auto who = by.find(partition);
+  const auto last = author.world().forgotten.find(partition);
+  if (last == author.world().forgotten.end()) return false;
   for (std::size_t i = 0; who != by.end() && i < plan_.owners; ++i) {
     const std::string name = cast_.name_of_daemon(i);
     const bool keeps = !plan_.may_lack_state(i) && !author.has_lost_power(name);
     const bool core = cast_.standings[i] == Cast::Standing::kCore;
-    if (core && keeps && who->second.count(name) > 0) return true;
+    const auto stored = who->second.find(name);
+    const bool told = stored != who->second.end() && stored->second.second >= last->second;
+    if (core && keeps && told) return true;
   }
   return false;
 }

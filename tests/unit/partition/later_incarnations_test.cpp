@@ -12,6 +12,7 @@ namespace tfdude {
 namespace {
 
 using testing::kNow;
+using testing::kStart;
 using testing::page_of;
 using testing::presence_of;
 using testing::Replica;
@@ -65,6 +66,23 @@ TEST_CASE("an incarnation known only from a lost participant hides no process") 
   head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
   CHECK(head.directory.serving("arm"));
   CHECK(head.structure() == Lines{"hand <  @ arm"});
+}
+
+TEST_CASE("an incarnation known from a participant that has restarted is told by who heard of it") {
+  Replica head("head");
+  Presence base = presence_of("base", 1, 0);
+  base.absent = {{"arm", 0, Kind::kSilent, 9}};
+  head.directory.apply(base, kNow);
+  // Dropped, since the base says it, too.
+  head.directory.apply(presence_of("arm", 5, 1), kNow);
+  CHECK_FALSE(head.directory.serving("arm"));
+  // The next process of the base has not heard of it.
+  head.directory.apply(presence_of("base", 2, 0), kNow);
+  for (auto time = kStart; time < kStart + 2 * Absences::kGrace; time += Absences::kGrace / 4) {
+    (void)head.directory.look_for_gone(time);
+  }
+  REQUIRE(head.directory.absent().size() == 1);
+  CHECK(head.directory.absent()[0].incarnation == 9);
 }
 
 TEST_CASE("an absence has the highest incarnation that hides the partition") {
