@@ -155,8 +155,8 @@ bool Verdict::lacks_one(Process& client) const {
   return false;
 }
 
-// Whether some daemon must have told a partition that it was last forgotten: that is in its file. Then
-// the partition has continued as a later process, whose pages all get.
+// Whether some daemon must have told a partition that it was last forgotten: that is in its file.
+// Then the partition has continued as a later process, whose pages all get.
 bool Verdict::is_told_by_one(const std::string& partition) const {
   if (cast_.standing(partition) != Cast::Standing::kCore) return false;
   const Author& author = *cast_.authors.front();
