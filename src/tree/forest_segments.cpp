@@ -4,6 +4,7 @@
 
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/held_edges.hpp"
 #include "tree/no_data.hpp"
 #include "tree/unspecified_edges.hpp"
 
@@ -70,20 +71,6 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   Query query;
   query.order = order;
   return values_at(segments, {met.limiting->stamp, true}, query, met);
-}
-
-template <class Visit>
-void for_each_held(const std::vector<Ends>& segments, Visit visit) {
-  for (const Ends& ends : segments) {
-    const Version* a = ends.a;
-    const Version* b = ends.b;
-    while (a != b) {
-      const Version*& here = a->depth >= b->depth ? a : b;
-      if (here->above == nullptr) break;
-      if (here->held()) visit(static_cast<const HeldVersion&>(*here));
-      here = Frames::at(*here->above, ends.commit);
-    }
-  }
 }
 
 // The newest history among the edges of these segments.

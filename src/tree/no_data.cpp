@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/saturating.hpp"
+#include "tree/held_edges.hpp"
 
 namespace tfdude {
 namespace {
@@ -29,19 +30,9 @@ DatedEdge dated(const HeldVersion& edge) {
 
 std::vector<DatedEdge> dynamic_edges(const std::vector<Ends>& segments) {
   std::vector<DatedEdge> found;
-  for (const Ends& ends : segments) {
-    const Version* a = ends.a;
-    const Version* b = ends.b;
-    while (a != b) {
-      const Version*& here = a->depth >= b->depth ? a : b;
-      if (here->above == nullptr) break;
-      if (here->held()) {
-        const auto& edge = static_cast<const HeldVersion&>(*here);
-        if (edge.moving()) found.push_back(dated(edge));
-      }
-      here = Frames::at(*here->above, ends.commit);
-    }
-  }
+  for_each_held(segments, [&](const HeldVersion& edge) {
+    if (edge.moving()) found.push_back(dated(edge));
+  });
   return found;
 }
 
