@@ -1,4 +1,4 @@
-// The uncertainty that owners keep over a restart, over each transport.
+// The uncertainty that owners keep over a restart.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +24,6 @@ namespace {
 
 using testing::eventually;
 using testing::Join;
-using testing::joined_by;
 using testing::ObservedChain;
 using testing::Random;
 using testing::TemporaryDirectory;
@@ -106,7 +105,7 @@ double difference(Client& client, const ObservedChain& chain, const Eigen::Matri
 }  // namespace
 
 TEST_CASE("kept: owners that restart between observations agree with one dense filter") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(0x4e97);
   INFO("seed " << random.seed());
   ObservedChain chain(random, kEdges);
@@ -139,7 +138,7 @@ TEST_CASE("kept: owners that restart between observations agree with one dense f
 }
 
 TEST_CASE("kept: a correlation set by request survives a restart and can be removed") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(0x4e98);
   INFO("seed " << random.seed());
   const ObservedChain chain(random, kEdges);
@@ -162,7 +161,7 @@ TEST_CASE("kept: a correlation set by request survives a restart and can be remo
 }
 
 TEST_CASE("kept: an invalid correlation of another owner's edge is rejected") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(0x4e99);
   INFO("seed " << random.seed());
   const ObservedChain chain(random, kEdges);

@@ -1,4 +1,4 @@
-// Points and poses of one frame in another over partitions, over each transport.
+// Points and poses of one frame in another over partitions.
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
@@ -12,12 +12,11 @@ namespace tfdude {
 namespace {
 
 using testing::ContainsSubstring;
-using testing::joined_by;
 using testing::Random;
 using testing::transform_diff;
 
 TEST_CASE("points: a client transforms as the transform that it looks up") {
-  const auto join = joined_by(GENERATE(from_range(testing::networks())));
+  const auto join = testing::join_loopback();
   Random random(821);
   INFO("seed " << random.seed());
   auto base =
@@ -61,7 +60,7 @@ TEST_CASE("points: a client transforms as the transform that it looks up") {
 }
 
 TEST_CASE("points: through an unspecified edge no covariance is claimed") {
-  const auto join = joined_by(GENERATE(from_range(testing::networks())));
+  const auto join = testing::join_loopback();
   auto base = Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}});
   auto client = Client::open(join(""));
   REQUIRE(base);

@@ -1,4 +1,4 @@
-// Uncertainty over partitions, over each transport: shared sources, bounds, orders, measurements.
+// Uncertainty over partitions: shared sources, bounds, orders, measurements.
 
 #include <cmath>
 #include <optional>
@@ -28,7 +28,6 @@ using testing::covariance_diff;
 using testing::eventually;
 using testing::Gaussian;
 using testing::Join;
-using testing::joined_by;
 using testing::Random;
 using testing::squared_distance;
 using testing::transform_diff;
@@ -76,7 +75,7 @@ Belief composed(const std::vector<Belief>& edges, Order order = Order::kSecond) 
 }  // namespace
 
 TEST_CASE("uncertainty: a source that edges of several owners share is counted once") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(661);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -105,7 +104,7 @@ TEST_CASE("uncertainty: a source that edges of several owners share is counted o
 }
 
 TEST_CASE("uncertainty: opposite errors of one source cancel exactly over two owners") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(662);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.0);
@@ -126,7 +125,7 @@ TEST_CASE("uncertainty: opposite errors of one source cancel exactly over two ow
 }
 
 TEST_CASE("uncertainty: unknown correlation over owners gives a bound and is reported") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(663);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -151,7 +150,7 @@ TEST_CASE("uncertainty: unknown correlation over owners gives a bound and is rep
 }
 
 TEST_CASE("uncertainty: all owners use the order of the lookup") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(664);
   INFO("seed " << random.seed());
   Robot robot(join, random, 0.2);
@@ -175,7 +174,7 @@ TEST_CASE("uncertainty: all owners use the order of the lookup") {
 }
 
 TEST_CASE("uncertainty: a watched path has the correlation of its edges") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   const bool composed_by_owners = GENERATE(false, true);
   Random random(665);
   INFO("seed " << random.seed());
@@ -198,7 +197,7 @@ TEST_CASE("uncertainty: a watched path has the correlation of its edges") {
 }
 
 TEST_CASE("uncertainty: a measurement of a path over owners gives the fused covariance") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(666);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -241,7 +240,7 @@ TEST_CASE("uncertainty: a measurement of a path over owners gives the fused cova
 }
 
 TEST_CASE("uncertainty: a measurement that the gate rejects changes nothing and is counted") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(667);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -269,7 +268,7 @@ TEST_CASE("uncertainty: a measurement that the gate rejects changes nothing and 
 }
 
 TEST_CASE("uncertainty: concurrent measurements of one path by two clients each count once") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(671);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -302,7 +301,7 @@ TEST_CASE("uncertainty: concurrent measurements of one path by two clients each 
 }
 
 TEST_CASE("uncertainty: fuse combines another owner's edge with a measurement of it") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(668);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -326,7 +325,7 @@ TEST_CASE("uncertainty: fuse combines another owner's edge with a measurement of
 }
 
 TEST_CASE("uncertainty: dynamic edges are corrected by a sample with the measurement's stamp") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(669);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -363,7 +362,7 @@ TEST_CASE("uncertainty: covariances stay consistent over 100 robots with two obs
   double sum = 0;
   constexpr int kRuns = 100;
   for (int run = 0; run < kRuns; ++run) {
-    Robot robot(joined_by(0), random);
+    Robot robot(testing::join_loopback(), random);
     const auto truth = [&](const Transform& X) {
       return X.pose * exp(Gaussian(X.covariance)(random));
     };

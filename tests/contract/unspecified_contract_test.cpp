@@ -1,4 +1,4 @@
-// Edges whose covariance is unspecified, over each transport: what callers elsewhere learn of them.
+// Edges whose covariance is unspecified: what callers elsewhere learn of them.
 
 #include <chrono>
 #include <optional>
@@ -21,7 +21,6 @@ using namespace std::chrono_literals;
 using testing::ContainsSubstring;
 using testing::eventually;
 using testing::Join;
-using testing::joined_by;
 using testing::Random;
 using testing::TemporaryDirectory;
 using testing::transform_diff;
@@ -76,7 +75,7 @@ Names unspecified_of(const Result<StampedTransform>& X) {
 
 TEST_CASE(
     "unspecified: a lookup names the edges of all owners and has the covariance of the rest") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(831);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -93,7 +92,7 @@ TEST_CASE(
 }
 
 TEST_CASE("unspecified: covariances are taken away and given by each kind of request") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(832);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -125,7 +124,7 @@ TEST_CASE("unspecified: covariances are taken away and given by each kind of req
 }
 
 TEST_CASE("unspecified: a watched path shows it, also between samples") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(833);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -149,7 +148,7 @@ TEST_CASE("unspecified: a watched path shows it, also between samples") {
 }
 
 TEST_CASE("unspecified: a segment that is pushed composed counts as a whole") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(834);
   Robot robot(join, random);
   WatchOptions options;
@@ -163,7 +162,7 @@ TEST_CASE("unspecified: a segment that is pushed composed counts as a whole") {
 }
 
 TEST_CASE("unspecified: an observed edge takes what the measurement says") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(835);
   INFO("seed " << random.seed());
   Robot robot(join, random);
@@ -193,7 +192,7 @@ TEST_CASE("unspecified: an observed edge takes what the measurement says") {
 }
 
 TEST_CASE("unspecified: a restarted owner still says so") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   Random random(836);
   const TemporaryDirectory directory;
   Robot robot(join, random, directory.path());

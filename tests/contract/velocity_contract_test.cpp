@@ -1,4 +1,4 @@
-// Velocities of paths over partitions, over each transport.
+// Velocities of paths over partitions.
 
 #include <chrono>
 #include <cmath>
@@ -20,7 +20,6 @@ using testing::along_x;
 using testing::Approx;
 using testing::ContainsSubstring;
 using testing::Join;
-using testing::joined_by;
 using testing::outcome;
 
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
@@ -55,7 +54,7 @@ struct Robot {
 };
 
 TEST_CASE("velocity: it is in the axes of A at the origin of B") {
-  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  Robot robot(testing::join_loopback());
   for (Client* caller : {&*robot.client, static_cast<Client*>(&*robot.arm)}) {
     const auto velocity = caller->velocity("world", "hand", {ms(1500), 2ms});
     REQUIRE(velocity);
@@ -75,7 +74,7 @@ TEST_CASE("velocity: it is in the axes of A at the origin of B") {
 }
 
 TEST_CASE("velocity: the interval ends at the latest common time") {
-  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  Robot robot(testing::join_loopback());
   REQUIRE(robot.base->update("base", along_x(2.01), ms(2010)));
   const auto newest = robot.client->velocity("world", "hand");
   REQUIRE(newest);
@@ -96,7 +95,7 @@ TEST_CASE("velocity: the interval ends at the latest common time") {
 }
 
 TEST_CASE("velocity: static edges do not move, whatever their errors are") {
-  Robot robot(joined_by(GENERATE(from_range(testing::networks()))), {}, isotropic(1, 1));
+  Robot robot(testing::join_loopback(), {}, isotropic(1, 1));
   for (const char* to : {"hand", "arm"}) {
     const auto still = robot.client->velocity("arm", to);
     REQUIRE(still);
@@ -108,7 +107,7 @@ TEST_CASE("velocity: static edges do not move, whatever their errors are") {
 }
 
 TEST_CASE("velocity: common errors of static edges cancel, and those of dynamic edges do not") {
-  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  const Join join = testing::join_loopback();
   SECTION("only the hand's mount is uncertain") {
     Robot robot(join, {}, isotropic(0.01, 0));
     const auto velocity = robot.client->velocity("world", "hand", {ms(1500), 2ms});
@@ -142,7 +141,7 @@ TEST_CASE("velocity: common errors of static edges cancel, and those of dynamic 
 }
 
 TEST_CASE("velocity: unspecified edges are named") {
-  Robot robot(joined_by(GENERATE(from_range(testing::networks()))));
+  Robot robot(testing::join_loopback());
   REQUIRE(robot.hand->update("hand", {along_x(0.5).pose, StatedCovariance::unspecified()}));
   const auto velocity = robot.client->velocity("world", "hand");
   REQUIRE(velocity);
