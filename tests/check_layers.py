@@ -41,6 +41,7 @@ CONFINED = [
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("OpenSSL", r"openssl/", ["src/keys/"]),
     ("zstd", r"zstd\.h$", ["src/recording/"]),
+    ("zlib", r"zlib\.h$", ["src/recording/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
     ("pybind11", r"(pybind11/|Python\.h$)", ["python/"]),
