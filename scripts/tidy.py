@@ -1,17 +1,22 @@
 #!/usr/bin/env python3
-"""Runs clang-tidy over src/ and apps/: tidy.py BUILD_DIR, the folder of compile_commands.json.
+"""Runs clang-tidy over src/ and apps/, those files first that were changed last: tidy.py [--minutes N] BUILD_DIR
 
-A clean file is not checked again until its preprocessed text, its compile command, the rules or the tool change: a
-full run takes many seconds per file, most of them in headers of other projects.
+BUILD_DIR is the folder of compile_commands.json. A clean file is not checked again until its preprocessed text, its
+compile command, the rules or the tool change: a full run takes many seconds per file, most of them in headers of other
+projects. With --minutes no file is begun after that time.
 """
 
+import argparse
 import concurrent.futures
 import hashlib
 import json
+import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
+import time
 
 JOBS = 2
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -45,28 +50,70 @@ def check(entry, rules, build, stamps):
     if run.returncode == 0:
         stamp.touch()
         return None
-    return run.stdout or run.stderr
+    return run.stdout or run.stderr or "clang-tidy failed for " + entry["file"]
+
+
+def changes():
+    """When each file of the project was last changed: by its last commit, or, if that is not it, by its own time."""
+    log = output_of("git", "-C", ROOT, "log", "--format=commit %ct", "--name-only").decode()
+    times = {}
+    at = 0
+    for line in log.splitlines():
+        if line.startswith("commit "):
+            at = int(line.split()[1])
+        elif line:
+            times.setdefault(line, at)
+    dirty = output_of("git", "-C", ROOT, "ls-files", "--modified", "--others", "--exclude-standard").decode()
+    for line in dirty.splitlines():
+        if (ROOT / line).exists():
+            times[line] = int(os.stat(ROOT / line).st_mtime)
+    return times
+
+
+def changed(file, times):
+    """When a source was last changed, or a header of the project that it includes itself."""
+    newest = times.get(str(file.relative_to(ROOT)), 0)
+    for name in re.findall(r'^#include "(.*)"', file.read_text(), re.MULTILINE):
+        for folder in ("src", "include", "apps"):
+            newest = max(newest, times.get(f"{folder}/{name}", 0))
+    return newest
 
 
 def main():
-    build = pathlib.Path(sys.argv[1]).resolve()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no file after this time")
+    parser.add_argument("build", type=pathlib.Path, help="the folder of compile_commands.json")
+    options = parser.parse_args()
+    until = time.monotonic() + 60 * options.minutes
+    build = options.build.resolve()
     commands = json.loads((build / "compile_commands.json").read_text())
     ours = [entry for entry in commands
             if pathlib.Path(entry["file"]).is_relative_to(ROOT / "src")
             or pathlib.Path(entry["file"]).is_relative_to(ROOT / "apps")]
     if not ours:
         sys.exit("tidy: no sources of src/ or apps/ in " + str(build))
+    times = changes()
+    ours.sort(key=lambda entry: changed(pathlib.Path(entry["file"]), times), reverse=True)
     stamps = build / "tidy"
     stamps.mkdir(exist_ok=True)
     rules = output_of("clang-tidy", "--version") + (ROOT / ".clang-tidy").read_bytes()
+    checked = 0
     bad = 0
+
+    def check_in_time(entry):
+        return check(entry, rules, build, stamps) if time.monotonic() < until else "late"
+
     with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-        for findings in pool.map(lambda entry: check(entry, rules, build, stamps), ours):
+        for findings in pool.map(check_in_time, ours):
+            if findings == "late":
+                continue
+            checked += 1
             if findings is not None:
                 bad += 1
                 print(findings, flush=True)
+    print(f"clang-tidy: checked {checked} of {len(ours)} files, those changed last")
     if bad:
-        sys.exit(f"clang-tidy: findings in {bad} of {len(ours)} files")
+        sys.exit(f"clang-tidy: findings in {bad} files")
 
 
 if __name__ == "__main__":
