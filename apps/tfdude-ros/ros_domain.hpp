@@ -65,7 +65,7 @@ struct Topic {
 [[nodiscard]] Topic pose_topic(const std::string& name);
 [[nodiscard]] Topic odometry_topic(const std::string& name);
 
-/// Who has written a message.
+/// The writer of a message.
 struct Source {
   std::string guid;                  ///< of the writer, as `ros2 topic info --verbose` prints it
   std::optional<BridgeMark> bridge;  ///< if it is one

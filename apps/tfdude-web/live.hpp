@@ -64,7 +64,7 @@ class Live {
   /// Somebody begins (1) or ceases (-1) to look. Meanwhile rates are asked for once a second, and
   /// joints five times.
   void count_viewer(int change) { viewers_ += change; }
-  /// Rates, refused samples, partitions: all of it, and what has changed. The number counts
+  /// Rates, rejected samples, partitions: all of it, and what has changed. The number counts
   /// changes.
   [[nodiscard]] Text status() const;
   [[nodiscard]] std::pair<std::uint64_t, Text> status_change() const;

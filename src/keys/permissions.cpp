@@ -16,7 +16,7 @@
 namespace tfdude::keys {
 namespace {
 
-/// Who may use a topic, which also determines in which DDS partitions.
+/// Which roles may use a topic; determines also in which DDS partitions.
 enum class Right {
   kServe,   // in its own partition
   kAll,     // in all

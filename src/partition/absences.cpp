@@ -18,8 +18,8 @@ void Absences::limit() {
   }));
 }
 
-void Absences::went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now,
-                    std::chrono::nanoseconds early) {
+void Absences::mark_absent(const std::string& partition, std::uint64_t incarnation, bool stopped,
+                           Time now, std::chrono::nanoseconds early) {
   const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
   // An earlier absence that is not resolved stays unresolved.
   const auto before = missed_.find(partition);
@@ -29,7 +29,7 @@ void Absences::went(const std::string& partition, std::uint64_t incarnation, boo
     there->second.early = early;
 }
 
-void Absences::told(const Absent& absent, const std::string& teller) {
+void Absences::add_report(const Absent& absent, const std::string& teller) {
   if (absent.kind == Absent::Kind::kBack) return;
   Absent silent = absent;
   silent.kind = Absent::Kind::kSilent;
@@ -39,7 +39,7 @@ void Absences::told(const Absent& absent, const std::string& teller) {
   if (is_new) limit();
 }
 
-void Absences::told_all(const std::vector<Absent>& absent, const std::string& teller) {
+void Absences::replace_reports(const std::vector<Absent>& absent, const std::string& teller) {
   for (auto it = missed_.begin(); it != missed_.end();) {
     const std::string& name = it->first;
     const Missed& missed = it->second;
@@ -72,7 +72,7 @@ bool Absences::returned(const std::string& partition) {
   const auto there = missed_.find(partition);
   if (there == missed_.end()) return false;
   Missed& missed = there->second;
-  if (outlived(missed.absent.kind)) {
+  if (survived(missed.absent.kind)) {
     missed.absent.kind = Absent::Kind::kBack;
     missed.pending = false;
   } else {

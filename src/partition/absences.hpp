@@ -20,9 +20,9 @@ class Absences {
  public:
   using Steady = std::chrono::steady_clock::time_point;
 
-  /// A silence counts as an absence, and a stopped partition as outlived, this long after it was
+  /// A silence counts as an absence, and a stopped partition as survived, this long after it was
   /// noticed. Otherwise a process that has hung, and then hears at once that another one stopped
-  /// and restarted, would seem to have outlived it.
+  /// and restarted, would seem to have survived it.
   static constexpr std::chrono::milliseconds kGrace{500};
 
   /// After this time, frames of the absent partition go to others that also claim them. It is
@@ -36,17 +36,17 @@ class Absences {
   /// A partition no longer sends, or has announced its stop.
   /// @param early  by how much later others may notice it. It counts as gone that much later, so
   ///   that all know of the absence by then
-  void went(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now,
-            std::chrono::nanoseconds early = {});
+  void mark_absent(const std::string& partition, std::uint64_t incarnation, bool stopped, Time now,
+                   std::chrono::nanoseconds early = {});
 
   /// Another participant, `teller`, misses a partition that was not discovered here. Hearsay counts
   /// only after kGrace: otherwise a process that has hung, and hears late what others reported
   /// meanwhile, would take it for its own observation. The time starts with the first report of a
   /// silence, so that it counts here when it does at the others.
-  void told(const Absent& absent, const std::string& teller);
+  void add_report(const Absent& absent, const std::string& teller);
   /// The complete list of those that the teller misses now. A silence that it no longer reports is
   /// over.
-  void told_all(const std::vector<Absent>& absent, const std::string& teller);
+  void replace_reports(const std::vector<Absent>& absent, const std::string& teller);
   /// The teller was restarted, so it cannot say what has become of the silences that it reported:
   /// they count as losses.
   void teller_restarted(const std::string& teller);
@@ -82,7 +82,7 @@ class Absences {
   [[nodiscard]] std::vector<Absent> all() const;
 
   /// Whether an absence of this kind gives the observer the frames that both claim.
-  [[nodiscard]] static bool outlived(Absent::Kind kind) {
+  [[nodiscard]] static bool survived(Absent::Kind kind) {
     return kind == Absent::Kind::kLost || kind == Absent::Kind::kStopped ||
            kind == Absent::Kind::kBack;
   }

@@ -28,7 +28,7 @@ std::vector<std::string> AskedFrames::lacking(const std::vector<std::string>& id
 
 FramesRequest AskedFrames::request(std::vector<std::string> ids,
                                    std::vector<std::string> trees) const {
-  return {std::move(ids), std::move(trees), directory_.told()};
+  return {std::move(ids), std::move(trees), directory_.announced_epochs()};
 }
 
 // Each frame comes after its parent, so none gets a parent that is still below it here.

@@ -63,7 +63,7 @@ void Directory::apply(const Presence& presence, Time now) {
   if (presence.stopped) {
     const bool known_to_be_there = partition.info.reachable;
     if (known_to_be_there && partition.live == presence.incarnation)
-      went(partition, owner, true, now);
+      mark_absent(partition, owner, true, now);
     return;
   }
   if (drop_outdated(partition, presence.incarnation)) return;
@@ -267,14 +267,14 @@ const std::string* Directory::incomplete() const {
   return found != partitions_.end() ? &found->info.name : nullptr;
 }
 
-bool Directory::told_of(Owner owner, std::uint64_t epoch) {
+bool Directory::note_announced_epoch(Owner owner, std::uint64_t epoch) {
   std::uint64_t& told = partitions_[owner].told_epoch;
   if (epoch <= told) return false;
   told = epoch;
   return true;
 }
 
-std::vector<SeenEpoch> Directory::told() const {
+std::vector<SeenEpoch> Directory::announced_epochs() const {
   std::vector<SeenEpoch> all;
   for (const Known& partition : partitions_) {
     if (partition.told_epoch > 0) all.push_back({partition.info.name, partition.told_epoch});

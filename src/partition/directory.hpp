@@ -46,7 +46,7 @@ class Directory {
   void apply(const Page& page);
 
   /// The partition's participant is lost; its structure is kept.
-  /// @param early  as of Absences::went()
+  /// @param early  as of Absences::mark_absent()
   /// @return false if this was known
   bool lost(std::string_view partition, std::uint64_t incarnation, Time now,
             std::chrono::nanoseconds early = {});
@@ -166,9 +166,9 @@ class Directory {
 
   /// An owner has announced a change that its structure shows in this epoch. @return whether it is
   /// the latest
-  bool told_of(Owner owner, std::uint64_t epoch);
+  bool note_announced_epoch(Owner owner, std::uint64_t epoch);
   /// All such changes: the latest of each owner.
-  [[nodiscard]] std::vector<SeenEpoch> told() const;
+  [[nodiscard]] std::vector<SeenEpoch> announced_epochs() const;
   /// Whether that change has not come yet.
   [[nodiscard]] bool owes_change(Owner owner) const {
     return !without_pages_ && partitions_[owner].epoch < partitions_[owner].told_epoch;
@@ -259,8 +259,8 @@ class Directory {
   [[nodiscard]] std::optional<Absent> told_absence(const Known& partition) const;
   bool drop_outdated(Known& partition, std::uint64_t incarnation);
   void came_back(Known& partition, Owner owner);
-  void went(Known& partition, Owner owner, bool stopped, Time now,
-            std::chrono::nanoseconds early = {});
+  void mark_absent(Known& partition, Owner owner, bool stopped, Time now,
+                   std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
   void resolve_returns();
   void tell_claims();

@@ -51,13 +51,13 @@ void Directory::came_back(Known& partition, Owner owner) {
   if (missed) tell_claims();
 }
 
-void Directory::went(Known& partition, Owner owner, bool stopped, Time now,
-                     std::chrono::nanoseconds early) {
+void Directory::mark_absent(Known& partition, Owner owner, bool stopped, Time now,
+                            std::chrono::nanoseconds early) {
   if (std::exchange(partition.info.reachable, false)) ++version_;
   partition.info.stopped = stopped;
   partition.info.since = now;
-  absences_.went(partition.info.name, partition.live, stopped, now, early);
-  absences_.told_all({}, partition.info.name);
+  absences_.mark_absent(partition.info.name, partition.live, stopped, now, early);
+  absences_.replace_reports({}, partition.info.name);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
@@ -74,7 +74,7 @@ bool Directory::lost(std::string_view partition, std::uint64_t incarnation, Time
   if (!number || *number == kHeldHere) return false;
   Known& gone = partitions_[*number];
   if (gone.live != incarnation || !gone.info.reachable) return false;
-  went(gone, *number, false, now, early);
+  mark_absent(gone, *number, false, now, early);
   return true;
 }
 
@@ -90,30 +90,30 @@ bool Directory::look_for_gone(Absences::Steady now) {
   return true;
 }
 
-// Passes on the partitions that this participant has outlived.
+// Passes on the partitions that this participant has survived.
 void Directory::tell_claims() {
-  std::set<Owner> outlived;
+  std::set<Owner> survived;
   for (const Absent& one : absences_.all()) {
     const auto number = number_of(one.partition);
-    if (number && Absences::outlived(one.kind)) outlived.insert(*number);
+    if (number && Absences::survived(one.kind)) survived.insert(*number);
   }
-  claims_.set_outlived(kHeldHere, std::move(outlived));
+  claims_.set_survived(kHeldHere, std::move(survived));
 }
 
 void Directory::hear_absent(Owner from, const Presence& presence) {
-  std::set<Owner> outlived;
+  std::set<Owner> survived;
   std::set<std::string> forgets;
   const std::string teller = partitions_[from].info.name;
   const bool same_process = partitions_[from].announced == presence.incarnation;
   // Only the process that reported a silence knows that it is over.
   if (!same_process) absences_.teller_restarted(teller);
-  absences_.told_all(presence.absent, teller);
+  absences_.replace_reports(presence.absent, teller);
   for (const Absent& one : presence.absent) {
     Owner number = kHeldHere;
     (void)known(one.partition, number);
     // A sender is reachable.
     if (number == from) continue;
-    if (Absences::outlived(one.kind)) outlived.insert(number);
+    if (Absences::survived(one.kind)) survived.insert(number);
     if (number == kHeldHere) continue;
     if (one.kind != Absent::Kind::kForgotten) {
       hear_of(one, teller);
@@ -125,14 +125,14 @@ void Directory::hear_absent(Owner from, const Presence& presence) {
     if (known_of.size() > Absences::kMost) known_of.erase(known_of.begin());
     hear_forgotten(partitions_[number], one, same_process && is_new);
   }
-  // It has heard of a later process.
+  // What the sender no longer forgets, it has heard a later process of.
   for (const std::string& name : std::exchange(partitions_[from].forgets, forgets)) {
     if (forgets.count(name) != 0) continue;
     Known& partition = partitions_[refer_to(name)];
     partition.to_forget = 0;
     partition.to_forget_all = false;
   }
-  claims_.set_outlived(from, std::move(outlived));
+  claims_.set_survived(from, std::move(survived));
 }
 
 void Directory::hear_of_itself(const std::vector<Absent>& absent) {
@@ -160,7 +160,7 @@ void Directory::hear_of(const Absent& one, const std::string& teller) {
   partition.missed_by_others = true;
   partition.info.since = Time(std::chrono::nanoseconds(one.since));
   partition.info.stopped = one.kind == Absent::Kind::kStopped;
-  absences_.told(one, teller);
+  absences_.add_report(one, teller);
   tell_claims();
 }
 
@@ -180,8 +180,8 @@ void Directory::hear_forgotten(Known& partition, const Absent& one, bool news) {
   forget_if_gone(partition, since);
 }
 
-// Whoever forgot it may not have heard of its latest process, which was heard here and is gone,
-// too. A process that is silent for a moment only may have been started since.
+// A participant that forgot the partition may not have heard of its latest process, which was heard
+// here and is gone, too. A process that is silent for a moment only may have been started since.
 void Directory::forget_if_gone(Known& partition, Time since) {
   if (!partition.to_forget_all || partition.info.reachable) return;
   const auto absence = absences_.find(partition.info.name);

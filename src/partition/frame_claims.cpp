@@ -57,11 +57,11 @@ bool FrameClaims::is_ended(const std::string& id, const FrameClaim& claim) const
   }) != nullptr;
 }
 
-const FrameClaim* FrameClaims::heir(const std::string& id, Claims claims) const {
+const FrameClaim* FrameClaims::winning_claim(const std::string& id, Claims claims) const {
   claims.erase(std::remove_if(claims.begin(), claims.end(),
                               [&](const FrameClaim* claim) { return is_ended(id, *claim); }),
                claims.end());
-  return claims.empty() ? nullptr : &succession_.heir(claims);
+  return claims.empty() ? nullptr : &succession_.winning_claim(claims);
 }
 
 bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) {
@@ -128,7 +128,7 @@ void FrameClaims::released(const std::string& id) {
 
 bool FrameClaims::may_take_from(Owner owner) const {
   return succession_.standing(owner) == Succession::Standing::kGone ||
-         succession_.outlived(kHeldHere, owner);
+         succession_.reported_survivor(kHeldHere, owner);
 }
 
 Owner FrameClaims::holder(const std::string& id) const {
@@ -161,7 +161,7 @@ void FrameClaims::promote(const std::string& id) {
   if (forest_.holds(id)) return;
   const auto claims = shadowed_.find(id);
   const FrameClaim* next = nullptr;
-  if (claims != shadowed_.end()) next = heir(id, all_of(claims->second));
+  if (claims != shadowed_.end()) next = winning_claim(id, all_of(claims->second));
   if (next == nullptr) return drop(id);
   const FrameClaim now = *next;
   auto& others = claims->second;
@@ -197,7 +197,7 @@ void FrameClaims::reconsider(const std::string& id) {
   const FrameClaim now = in_force(*there);
   const auto others = shadowed_.find(id);
   const FrameClaim* next =
-      heir(id, others != shadowed_.end() ? all_of(others->second, now) : Claims{&now});
+      winning_claim(id, others != shadowed_.end() ? all_of(others->second, now) : Claims{&now});
   if (next != nullptr && next->owner == now.owner) return;
   shadow(id, now);
   cut_.erase(id);
@@ -208,8 +208,8 @@ void FrameClaims::set_standing(Owner owner, Succession::Standing standing) {
   if (succession_.set_standing(owner, standing)) reconsider();
 }
 
-void FrameClaims::set_outlived(Owner owner, std::set<Owner> outlived) {
-  if (succession_.set_outlived(owner, std::move(outlived))) reconsider();
+void FrameClaims::set_survived(Owner owner, std::set<Owner> survived) {
+  if (succession_.set_survived(owner, std::move(survived))) reconsider();
 }
 
 bool FrameClaims::contests_held(Owner owner) const {
@@ -231,7 +231,7 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
     const auto there = forest_.info(id);
     if (!there || there->owner != kHeldHere) continue;
     const FrameClaim own = in_force(*there);
-    const FrameClaim* next = heir(id, all_of(claims, own));
+    const FrameClaim* next = winning_claim(id, all_of(claims, own));
     // Nothing is yielded to an unreachable partition, which may never return.
     if (next == nullptr || next->owner == kHeldHere || !is_there(next->owner)) continue;
     all.insert({PendingYield::Kind::kRelease, id, next->owner, there->lamport_time});
@@ -316,7 +316,7 @@ void FrameClaims::put(const std::string& id, const FrameClaim& claim) {
     changes_.frame_added(id, after->parent, name(claim.owner));
   } else if (before->owner != after->owner &&
              (succession_.standing(before->owner) != Succession::Standing::kThere ||
-              succession_.outlived(after->owner, before->owner))) {
+              succession_.reported_survivor(after->owner, before->owner))) {
     // Others may have noticed it before.
     changes_.frame_taken_over(id, after->parent, name(claim.owner), name(before->owner));
   } else if (before->parent != after->parent || before->owner != after->owner) {

@@ -65,8 +65,8 @@ class FrameClaims {
 
   /// Sets whether a partition is present; initially all are. O(contested frames) if it changes.
   void set_standing(Owner owner, Succession::Standing standing);
-  /// Sets which partitions a partition claims to have outlived. O(contested frames) if it changes.
-  void set_outlived(Owner owner, std::set<Owner> outlived);
+  /// Sets which partitions a partition claims to have survived. O(contested frames) if it changes.
+  void set_survived(Owner owner, std::set<Owner> survived);
 
   /// Whether that partition also claims a frame that this process holds. O(contested frames).
   [[nodiscard]] bool contests_held(Owner owner) const;
@@ -91,7 +91,7 @@ class FrameClaims {
   void released(const std::string& id);
 
   /// Prepares for holding a frame that may belong to another partition. A new partition yields to
-  /// those present, whichever claim is older, unless it has outlived them.
+  /// those present, whichever claim is older, unless it has survived them.
   /// @return false if it has to yield
   [[nodiscard]] bool take(const std::string& id);
   /// The partition to which it has to yield.
@@ -122,7 +122,7 @@ class FrameClaims {
   /// it, and the owner is still gone.
   [[nodiscard]] bool is_ended(const std::string& id, const FrameClaim& claim) const;
   /// The claim that holds; null: all have ended.
-  [[nodiscard]] const FrameClaim* heir(const std::string& id, Claims claims) const;
+  [[nodiscard]] const FrameClaim* winning_claim(const std::string& id, Claims claims) const;
   /// Held frames that others have removed for whom the condition holds.
   template <class Condition>
   void add_removed(std::set<PendingYield>& all, Condition condition) const;

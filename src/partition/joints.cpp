@@ -83,19 +83,19 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
   movers_.push_back(std::move(mover));
 }
 
-void Joints::let_go(const std::string& frame) {
-  for (Mover& mover : movers_) mover.let_go = mover.let_go || mover.frame == frame;
+void Joints::detach_joint(const std::string& frame) {
+  for (Mover& mover : movers_) mover.detached = mover.detached || mover.frame == frame;
 }
 
 bool Joints::is_coupled(std::string_view frame) const {
   return std::any_of(movers_.begin(), movers_.end(), [frame](const Mover& mover) {
-    return mover.spec.coupled && !mover.let_go && mover.frame == frame;
+    return mover.spec.coupled && !mover.detached && mover.frame == frame;
   });
 }
 
 // For removed frames; another frame with that id is a different one.
 void Joints::forget_removed() {
-  for (Mover& mover : movers_) mover.let_go = mover.let_go || !forest_.info(mover.handle);
+  for (Mover& mover : movers_) mover.detached = mover.detached || !forest_.info(mover.handle);
 }
 
 Result<void> Joints::plan(const JointValue& value) {
@@ -104,7 +104,7 @@ Result<void> Joints::plan(const JointValue& value) {
   if (auto ok = check_value(value); !ok) return ok;
   for (const std::size_t index : found->second) {
     Mover& mover = movers_[index];
-    if (mover.let_go) continue;
+    if (mover.detached) continue;
     const JointSpec& spec = mover.spec;
     const Mimic mimic = spec.mimic.value_or(Mimic{});
     Step step{index, mimic.position(value.position),
@@ -197,7 +197,7 @@ std::vector<JointInfo> Joints::infos(std::string_view after) const {
   }
   if (!shown_.empty()) return infos;
   for (const Mover& mover : movers_) {
-    if (mover.spec.name <= after || mover.let_go || !forest_.info(mover.handle)) continue;
+    if (mover.spec.name <= after || mover.detached || !forest_.info(mover.handle)) continue;
     const JointSpec& spec = mover.spec;
     infos.push_back({spec.name, mover.frame, spec.type, spec.limits, spec.mimic, mover.position,
                      mover.variance, mover.measured, mover.outside, mover.refused});

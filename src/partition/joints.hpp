@@ -38,7 +38,7 @@ class Joints {
            const std::optional<StoredJoint>& left);
 
   /// From now on the joint does not move the frame.
-  void let_go(const std::string& frame);
+  void detach_joint(const std::string& frame);
 
   /// Whether a position of the joint concerns this partition. O(log joints); takes no lock.
   [[nodiscard]] bool moves(std::string_view name) const {
@@ -77,7 +77,7 @@ class Joints {
     std::optional<Time> stamp{};  // of the newest sample
     bool measured = false;
     bool changed = false;
-    bool let_go = false;
+    bool detached = false;
     std::uint64_t outside = 0;
     std::uint64_t refused = 0;
     std::uint64_t planned = 0;  // number of the last update that moved it

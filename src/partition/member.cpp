@@ -73,19 +73,19 @@ void Member::on_time(Steady now) {
 }
 
 std::optional<Reply> Member::on_request(const PeerId& from, const Request& request,
-                                        const std::optional<Error>& refusal, Time now) {
+                                        const std::optional<Error>& rejection, Time now) {
   const bool changes = !is_read_only(request);
   Reply reply;
   if (!given_up_.empty()) {
     reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
-  } else if (changes && refusal) {
-    reply = partition_->refuse(from, request, *refusal, now);
+  } else if (changes && rejection) {
+    reply = partition_->refuse(from, request, *rejection, now);
   } else {
     reply = partition_->answer(from, request, now);
     look_for_contests();
   }
   // Changes that are not stored are not announced, however long that takes.
-  if (!changes && refusal) reply.epoch = std::min(reply.epoch, told_epoch_);
+  if (!changes && rejection) reply.epoch = std::min(reply.epoch, told_epoch_);
   if (!changes || (!stores_ && is_of_values(request))) return reply;
   outcome_.to_reply = true;
   // A repeated request whose first copy still waits is dropped.
@@ -96,8 +96,8 @@ std::optional<Reply> Member::on_request(const PeerId& from, const Request& reque
 
 // ---- requests of its own process
 
-Reply Member::answer(const Request& request, const std::optional<Error>& refusal, Time now) {
-  if (refusal && is_of_structure(request)) return {request.sequence, 0, *refusal};
+Reply Member::answer(const Request& request, const std::optional<Error>& rejection, Time now) {
+  if (rejection && is_of_structure(request)) return {request.sequence, 0, *rejection};
   Reply reply = partition_->answer(request, now);
   look_for_contests();
   // This process sees the change already; the others are informed asynchronously.
@@ -163,7 +163,7 @@ void Member::claim(const std::string& host, std::uint32_t pid, Time now, std::ui
   presence_ = {name_, incarnations_.next(now, random), host, pid, 0, false};
   presence_.ticket = presence_.incarnation;
   presence_.program = program_version();
-  // It serves with a later number, even if its clock is set back until then.
+  // This process serves with a later number, even if its clock is set back until then.
   incarnations_.saw(presence_.incarnation);
   claim_.claim(presence_);
 }

@@ -36,23 +36,24 @@ class Member {
 
   void on_page(const Page& page);
   void on_presence(const Presence& presence, Time now);
-  /// @param early  as of Absences::went()
+  /// @param early  as of Absences::mark_absent()
   void on_lost(const std::string& partition, std::uint64_t incarnation, Time now,
                std::chrono::nanoseconds early = {});
   /// Call at least twice per Absences::kGrace while a partition is silent.
   void on_time(Steady now);
 
   /// Handles a request of a peer other than a lookup. [joints]
-  /// @param refusal  why no changes may be made now: earlier ones could not be stored
+  /// @param rejection  why no changes may be made now: earlier ones could not be stored
   /// @return the reply to send at once; empty if it follows with Ready, after its changes are
   ///   stored
   [[nodiscard]] std::optional<Reply> on_request(const PeerId& from, const Request& request,
-                                                const std::optional<Error>& refusal, Time now);
+                                                const std::optional<Error>& rejection, Time now);
 
   // ---- requests of its own process
 
   /// As on_request(), for its own process, which sees its changes before they are stored. [joints]
-  [[nodiscard]] Reply answer(const Request& request, const std::optional<Error>& refusal, Time now);
+  [[nodiscard]] Reply answer(const Request& request, const std::optional<Error>& rejection,
+                             Time now);
   /// As Partition::release(). [joints]
   [[nodiscard]] Result<void> release(const std::vector<std::string>& ids, Time now);
   /// Drops everything about an unreachable partition. @return kPartitionTaken if it is reachable.
@@ -126,7 +127,7 @@ class Member {
   std::string given_up_;
   bool stores_ = false;
   std::pair<std::uint64_t, std::uint64_t> planned_with_{};  // versions at the last outcome
-  std::uint64_t told_epoch_ = 0;  // of the published structure
+  std::uint64_t told_epoch_ = 0;                            // of the published structure
   std::map<std::pair<PeerId, std::uint32_t>, PendingReply> replies_;
   Outcome outcome_;
 };

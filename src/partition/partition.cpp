@@ -37,7 +37,7 @@ Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest
 Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
   if (auto ok = check_joints(frames); !ok) return ok;
   if (auto taken = take(frames, directory_.next_lamport_time(now)); !taken) return taken;
-  hang_on_joints(frames, {});
+  attach_joints(frames, {});
   pages_.close_epoch();
   return {};
 }
@@ -74,8 +74,8 @@ Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t
 }
 
 // A frame whose parent is not that of its description was moved by hand.
-void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
-                               const std::vector<StoredJoint>& left) {
+void Partition::attach_joints(const std::vector<FrameSpec>& frames,
+                              const std::vector<StoredJoint>& left) {
   for (const FrameSpec& frame : frames) {
     const auto info = forest_.info(frame.id);
     const bool there = info && info->owner == kHeldHere && info->parent == frame.parent;
@@ -87,8 +87,8 @@ void Partition::hang_on_joints(const std::vector<FrameSpec>& frames,
   }
 }
 
-void Partition::let_go(const std::string& id) {
-  joints_.let_go(id);
+void Partition::detach_joint(const std::string& id) {
+  joints_.detach_joint(id);
   if (const auto joint = pages_.erase_joint(id)) directory_.erase_own_joint(*joint);
 }
 
@@ -222,7 +222,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
   consistency_.erase(id);
-  let_go(id);
+  detach_joint(id);
   pages_.put(id, request.parent, lamport_time);
   pages_.close_epoch();
   directory_.changes().frame_moved(id, request.parent, name_);
@@ -248,7 +248,7 @@ void Partition::forget(const std::vector<std::string>& removed, LamportTime when
   if (removed.empty()) return;
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
     consistency_.erase(*id);
-    let_go(*id);
+    detach_joint(*id);
     pages_.erase(*id);
     leave({*id, when, Tombstone::Kind::kRemoved, {}});
     directory_.changes().frame_removed(*id, name_);
@@ -258,16 +258,16 @@ void Partition::forget(const std::vector<std::string>& removed, LamportTime when
 }
 
 Result<void> Partition::update(const UpdateRequest& request) {
-  return told_of(request.edges, forest_.update(request.edges, request.stamp));
+  return note_update(request.edges, forest_.update(request.edges, request.stamp));
 }
 
 Result<void> Partition::update(const PartialUpdateRequest& request) {
-  return told_of(request.edges, forest_.update_partial(request.edges, request.stamp));
+  return note_update(request.edges, forest_.update_partial(request.edges, request.stamp));
 }
 
 // Notes the result of an update for saving and for statistics.
 template <class Edge>
-Result<void> Partition::told_of(const std::vector<Edge>& edges, Result<void> updated) {
+Result<void> Partition::note_update(const std::vector<Edge>& edges, Result<void> updated) {
   if (updated) {
     values_asked_ = true;
     return {};

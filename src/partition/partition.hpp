@@ -53,7 +53,7 @@ class Partition {
   /// Answers any request of a peer; a repeated one gets the same reply.
   [[nodiscard]] Reply answer(const PeerId& peer, const Request& request, Time now);
 
-  /// Refuses a change that may not be made now. A request that was answered before gets the same
+  /// Rejects a change that may not be made now. A request that was answered before gets the same
   /// reply.
   [[nodiscard]] Reply refuse(const PeerId& peer, const Request& request, const Error& why,
                              Time now);
@@ -110,7 +110,7 @@ class Partition {
   /// The number of replies kept for requests that may be repeated.
   [[nodiscard]] std::size_t kept_replies() const { return replies_.size(); }
 
-  /// Whatever must be saved, since the last call; but the values are left to add_values().
+  /// All that must be saved since the last call, except values, which add_values() adds.
   /// @param values_due  whether values that no request waits for must be saved, even if nothing
   ///   else has changed
   [[nodiscard]] StateChange take_unsaved(bool values_due = false);
@@ -137,13 +137,13 @@ class Partition {
   [[nodiscard]] Result<void> update(const UpdateRequest& request);
   [[nodiscard]] Result<void> update(const PartialUpdateRequest& request);
   template <class Edge>
-  [[nodiscard]] Result<void> told_of(const std::vector<Edge>& edges, Result<void> updated);
+  [[nodiscard]] Result<void> note_update(const std::vector<Edge>& edges, Result<void> updated);
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time);
-  void hang_on_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
-  void let_go(const std::string& id);
+  void attach_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
+  void detach_joint(const std::string& id);
   [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
   bool yield(const PendingYield& pending, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
@@ -158,7 +158,7 @@ class Partition {
   void forget(const std::vector<std::string>& removed, LamportTime when);
   void yield_to(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
-  void unhang(const std::string& id, Owner rival, Time now);
+  void make_root(const std::string& id, Owner rival, Time now);
   void tell_conflict(const Tombstone& tombstone);
   [[nodiscard]] Error at_home(Error error, std::string_view id) const;
 

@@ -83,7 +83,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   while (yield(pending_yields(), now)) {
   }
   auto taken = reconfigure(state, joints, configured, now);
-  if (taken) hang_on_joints(configured, joints);
+  if (taken) attach_joints(configured, joints);
   pages_.close_epoch();
   return taken;
 }
@@ -150,7 +150,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
 // as they do for a tombstone of a removed frame.
 bool Partition::release(const std::string& id, std::optional<LamportTime> dropped) {
   if (!forest_.release(id)) return false;
-  let_go(id);
+  detach_joint(id);
   pages_.erase(id);
   if (dropped) leave({id, *dropped, Tombstone::Kind::kDropped, {}});
   directory_.released(id);
@@ -198,14 +198,14 @@ bool Partition::yield(const PendingYield& pending, Time now) {
   switch (pending.kind) {
     case PendingYield::Kind::kRelease:
       (void)forest_.release(pending.frame);
-      let_go(pending.frame);
+      detach_joint(pending.frame);
       pages_.erase(pending.frame);
       yield_to(pending.frame, pending.rival, now);
       directory_.released(pending.frame);
       return true;
     case PendingYield::Kind::kUnhang:
       if (frame->parent.empty()) return false;
-      unhang(pending.frame, pending.rival, now);
+      make_root(pending.frame, pending.rival, now);
       return true;
     case PendingYield::Kind::kRemove:
       // As of the rival's removal: it must not end what others have claimed since.
@@ -225,10 +225,10 @@ Result<void> Partition::forget_partition(const ForgetRequest& request, Time now)
   return directory_.forget(request.partition, request.incarnation, now);
 }
 
-void Partition::unhang(const std::string& id, Owner rival, Time now) {
+void Partition::make_root(const std::string& id, Owner rival, Time now) {
   const std::uint64_t lamport_time = directory_.next_lamport_time(now);
   if (!forest_.move(id, {}, {}, lamport_time)) return;
-  let_go(id);
+  detach_joint(id);
   pages_.put(id, {}, lamport_time);
   directory_.changes().frame_moved(id, {}, name_);
   tell_conflict({id, lamport_time, Tombstone::Kind::kUnhung, directory_.name(rival)});

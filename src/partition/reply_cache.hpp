@@ -21,7 +21,7 @@ namespace tfdude {
 /// (Request::awaits_from). So replies are kept as long as their request may be repeated, however
 /// many others of the same peer were answered meanwhile. For each peer a mark is kept: the number
 /// below which its requests are over. Bounded: if more than kReplies are awaited, or more than
-/// kPeers have sent requests, requests that might have been applied before are refused. Not
+/// kPeers have sent requests, requests that might have been applied before are rejected. Not
 /// thread-safe.
 class ReplyCache {
  public:

@@ -30,30 +30,30 @@ bool Succession::set_standing(Owner owner, Standing standing) {
   return std::exchange(owners_[owner].standing, standing) != standing;
 }
 
-bool Succession::set_outlived(Owner owner, std::set<Owner> outlived) {
-  if (owners_[owner].outlived == outlived) return false;
-  owners_[owner].outlived = std::move(outlived);
+bool Succession::set_survived(Owner owner, std::set<Owner> survived) {
+  if (owners_[owner].survived == survived) return false;
+  owners_[owner].survived = std::move(survived);
   return true;
 }
 
-bool Succession::outlived(Owner first, Owner second) const {
-  return owners_[first].outlived.count(second) != 0 && owners_[second].outlived.count(first) == 0;
+bool Succession::reported_survivor(Owner first, Owner second) const {
+  return owners_[first].survived.count(second) != 0 && owners_[second].survived.count(first) == 0;
 }
 
 bool Succession::survived(Owner first, Owner second) const {
-  return is_gone(first) == is_gone(second) ? outlived(first, second) : is_gone(second);
+  return is_gone(first) == is_gone(second) ? reported_survivor(first, second) : is_gone(second);
 }
 
 bool Succession::older(const FrameClaim& a, const FrameClaim& b) const {
   return std::tie(a.lamport_time, name(a.owner)) < std::tie(b.lamport_time, name(b.owner));
 }
 
-const FrameClaim& Succession::heir(const std::vector<const FrameClaim*>& claims) const {
+const FrameClaim& Succession::winning_claim(const std::vector<const FrameClaim*>& claims) const {
   const List there =
       preferred(claims, [this](const FrameClaim* one) { return !is_gone(one->owner); });
   const List left = preferred(there, [&](const FrameClaim* one) {
     return std::none_of(there.begin(), there.end(), [&](const FrameClaim* other) {
-      return outlived(other->owner, one->owner);
+      return reported_survivor(other->owner, one->owner);
     });
   });
   return **std::min_element(

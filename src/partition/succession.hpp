@@ -15,7 +15,7 @@ struct FrameClaim;
 /// present, and which were present while another was not:
 ///
 /// 1. Claims of partitions that are gone do not count if another claim does.
-/// 2. A claim does not count against that of a partition that has outlived its owner (Absences),
+/// 2. A claim does not count against that of a partition that has survived its owner (Absences),
 ///    unless the owner says the same of that partition.
 /// 3. Of the remaining claims the oldest is in force; ties: the alphabetically first partition.
 ///
@@ -36,24 +36,24 @@ class Succession {
   bool set_standing(Owner owner, Standing standing);
   [[nodiscard]] Standing standing(Owner owner) const { return owners_[owner].standing; }
 
-  /// Sets which partitions a partition claims to have outlived. @return whether it has changed
-  bool set_outlived(Owner owner, std::set<Owner> outlived);
+  /// Sets which partitions a partition claims to have survived. @return whether it has changed
+  bool set_survived(Owner owner, std::set<Owner> survived);
 
   /// Whether claims of the second do not count against those of the first.
-  [[nodiscard]] bool outlived(Owner first, Owner second) const;
+  [[nodiscard]] bool reported_survivor(Owner first, Owner second) const;
   [[nodiscard]] bool is_gone(Owner owner) const { return standing(owner) == Standing::kGone; }
   /// By both rules, of two partitions alone.
   [[nodiscard]] bool survived(Owner first, Owner second) const;
 
   /// @param claims  to one frame, by different owners; at least one
   /// @return the claim that holds
-  [[nodiscard]] const FrameClaim& heir(const std::vector<const FrameClaim*>& claims) const;
+  [[nodiscard]] const FrameClaim& winning_claim(const std::vector<const FrameClaim*>& claims) const;
 
  private:
   struct Known {
     std::string name;
     Standing standing = Standing::kThere;
-    std::set<Owner> outlived;
+    std::set<Owner> survived;
   };
   [[nodiscard]] bool older(const FrameClaim& a, const FrameClaim& b) const;
 

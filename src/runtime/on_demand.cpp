@@ -70,7 +70,7 @@ Result<std::vector<KnownFrame>> OnDemand::followed(const Deadline& deadline) {
 
 void OnDemand::changed(Owner owner, std::uint64_t epoch) {
   const Lock lock(structure_.mutex);
-  if (structure_.directory.told_of(owner, epoch)) asked_.outdate();
+  if (structure_.directory.note_announced_epoch(owner, epoch)) asked_.outdate();
 }
 
 Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,

@@ -64,7 +64,7 @@ void Requests::await_change(const Part& part, const Reply& reply, const Deadline
            !structure_.directory.reachable(part.owner);
   };
   const bool arrived = structure_.changed.wait_until(lock, deadline.at(), arrived_or_gone);
-  structure_.directory.told_of(part.owner, epoch);
+  structure_.directory.note_announced_epoch(part.owner, epoch);
   if (arrived) return;
   discovery_.fell_behind();
   log().warn("partition {} has made a change that has not arrived here within {}",

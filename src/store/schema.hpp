@@ -25,7 +25,7 @@ inline constexpr double kUnspecifiedVariance = -1;
 inline constexpr std::int64_t kClearedStamp = -1;
 
 /// The SQL that creates the tables of a format, or only those that an older format lacks. A file
-/// whose schema has other words than these is refused, so each change of them needs a new format.
+/// whose schema has other words than these is rejected, so each change of them needs a new format.
 [[nodiscard]] std::string schema_of(std::int64_t format, std::int64_t older = 0);
 
 }  // namespace tfdude

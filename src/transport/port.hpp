@@ -24,7 +24,7 @@ struct IncompatiblePeer {
   std::string program;  ///< the version of its program
   Time since;           ///< when it was discovered, by the system's clock
 
-  /// Who it is, both versions, and what to do.
+  /// A sentence: its name, both versions, and what to do.
   [[nodiscard]] std::string text() const;
 };
 

@@ -251,7 +251,7 @@ class Forest {
                                                       std::optional<Time> hint = std::nullopt,
                                                       bool edges = false) const;
 
-  /// The values of such segments at their newest common instant, after those at earlier instants
+  /// The values of such segments at their latest common time, after those at earlier instants
   /// at which an edge has a sample, and that are not known from `seen`. All are of one commit. If
   /// the history of an edge was cleared, the last one says that there are no values.
   /// @param most  of the earlier instants, the newest

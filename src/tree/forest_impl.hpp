@@ -143,7 +143,7 @@ class Forest::Impl {
                                             std::optional<Time> stamp, std::uint64_t seen)
       TFDUDE_REQUIRES(mutex_);
   /// The value with the whole covariance of an edge, except for common errors of declared sources.
-  /// It is stored for an observed edge if the common errors of observations are not.
+  /// Stored for an observed edge if the common errors of observations are not.
   [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
   [[nodiscard]] static Transform whole(const HeldVersion& edge) {
     const bool observed = edge.correlation != nullptr && edge.correlation->revised;

@@ -9,7 +9,7 @@
 
 namespace tfdude {
 
-/// Counts of samples that an edge refused.
+/// Counts of samples that an edge rejected.
 struct Refused {
   std::atomic<std::uint64_t> old{0};    ///< older than the kept history
   std::atomic<std::uint64_t> equal{0};  ///< the stamp of another sample
@@ -24,7 +24,7 @@ struct Refused {
   } behind;
 };
 
-/// The counts of an edge. They are allocated with its first refused sample, as most have none.
+/// The counts of an edge. They are allocated with its first rejected sample, as most have none.
 class RefusedSamples {
  public:
   RefusedSamples() = default;
@@ -32,7 +32,7 @@ class RefusedSamples {
   RefusedSamples(const RefusedSamples&) = delete;
   RefusedSamples& operator=(const RefusedSamples&) = delete;
 
-  /// Null: none was refused.
+  /// Null: none was rejected.
   [[nodiscard]] const Refused* counts() const { return counts_.load(std::memory_order_acquire); }
 
   /// To count one; for writers only.

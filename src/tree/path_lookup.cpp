@@ -223,7 +223,7 @@ Result<void> PathLookup::walk_newest(const Ends& ends, Absent absent, Order orde
   };
   auto newest = walk(ends, absent, order, take, X_AB);
   met = {limiting, limiting != nullptr, correlated};
-  // It has the earliest of all stamps.
+  // An edge without a sample has the earliest of all stamps.
   if (newest && limiting != nullptr && limiting->lacks_sample()) return no_data(Errc::kNotYet);
   if (!newest || !mixed || correlated) return newest;
   Query query;

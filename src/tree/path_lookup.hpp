@@ -35,7 +35,7 @@ class PathLookup {
   /// An instant of a lookup.
   struct Instant {
     std::int64_t t;
-    /// It is the latest common time, so edges that had no sample yet have their first value.
+    /// The latest common time: edges that had no sample yet have their first value.
     bool common = false;
   };
 

@@ -16,7 +16,7 @@ std::chrono::nanoseconds apart(std::int64_t earlier, std::int64_t later) {
 }
 
 // Whether a sample continues the row of samples older than the kept history. Samples are checked
-// before they are applied, together with others that may be refused. So a sample with the same
+// before they are applied, together with others that may be rejected. So a sample with the same
 // stamp belongs to the same row.
 bool goes_on(const Refused::Behind& row, std::int64_t newest, std::int64_t stamp) {
   return row.count > 0 && row.newest == newest && row.last <= stamp;

@@ -88,7 +88,7 @@ class PlainOwner {
     yield_to(others);
     for (const std::string& id : orphans(others, tombstones)) (void)remove(id);
     // What was made a root is claimed later than by all others, which may bring the next cycle.
-    while (unhang(others)) yield_to(others);
+    while (make_root(others)) yield_to(others);
   }
 
   /// Takes over the Lamport times of what was changed just now, later than all that were known; all
@@ -156,7 +156,7 @@ class PlainOwner {
     }
   }
 
-  bool unhang(const Picture& others) {
+  bool make_root(const Picture& others) {
     const Picture picture = with(others);
     bool any = false;
     for (const auto& cycle : cycles_of(picture)) {

@@ -1,4 +1,4 @@
-// The programs and the library with keys, over real DDS: who is refused what, and that a refusal
+// The programs and the library with keys, over real DDS: who is rejected what, and that a rejection
 // changes nothing and disturbs nobody.
 
 #include <algorithm>
@@ -105,7 +105,7 @@ class SecuredRobot {
   std::optional<Process> base;
 };
 
-// The error of a command that must be refused, by its code.
+// The error of a command that must be rejected, by its code.
 std::string refused(const CliResult& result, const std::string& code) {
   CAPTURE(result.out, result.err);
   CHECK(result.status != 0);

@@ -137,7 +137,8 @@ void Author::change_here(const std::shared_ptr<Process>& node, const std::string
   // The author knows of the change, so its process has to hear of it before it removes frames.
   Directory& directory = process_->directory();
   directory.saw_lamport_time(node->directory().latest_lamport_time());
-  if (const auto owner = directory.owner(node->partition())) directory.told_of(*owner, reply.epoch);
+  if (const auto owner = directory.owner(node->partition()))
+    directory.note_announced_epoch(*owner, reply.epoch);
   if (const auto* error = std::get_if<Error>(&reply.body)) return end(tl::unexpected(*error));
   node->when_stored(end);
   // Its process may end before.
@@ -186,7 +187,7 @@ void Author::check_seen(const std::string& id, const std::string& parent) {
   const auto frame = process.forest().info(id);
   const Directory& directory = process.directory();
   const auto owner = directory.owner(model_.frame(id).partition);
-  const auto told = directory.told();
+  const auto told = directory.announced_epochs();
   const bool late = std::any_of(told.begin(), told.end(), [&](const SeenEpoch& one) {
     const auto number = directory.owner(one.partition);  // none if it was forgotten
     return number && directory.owes_change(*number);

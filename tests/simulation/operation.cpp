@@ -142,7 +142,7 @@ void Operation::look_again() {
     if (!done || owner == kHeldHere || reads) continue;
     const bool here = directory.epoch(owner) >= reply.epoch || !directory.reachable(owner);
     confirmed = confirmed && here;
-    if (here || now() >= deadline_) directory.told_of(owner, reply.epoch);
+    if (here || now() >= deadline_) directory.note_announced_epoch(owner, reply.epoch);
   }
   if (!confirmed && now() < deadline_) return;
   if (!stored_ && outcome_) outcome_ = fail(Errc::kTimeout, "changed, but not stored in time");

@@ -31,8 +31,8 @@ struct ExportEdge {
   std::string child;
   std::string ros_parent;
   std::string ros_child;
-  /// It leads over a joint. Before its first sample it is not sent: a listener of tf2 that has met
-  /// an edge on /tf_static takes it for static from then on.
+  /// The edge leads over a joint. Before its first sample it is not sent: a listener of tf2 takes
+  /// an edge that was once on /tf_static for static from then on.
   bool moves = false;
 
   friend bool operator==(const ExportEdge& a, const ExportEdge& b) {

@@ -105,7 +105,7 @@ Result<void> DescriptionOut::publish(const std::string& text) {
 void DescriptionOut::ask() {
   const auto text = client_.description(settings_.partition);
   if (!text) {
-    // It may come up later.
+    // The partition may appear later.
     if (text.error().code != Errc::kUnknownPartition) {
       spdlog::warn("no description of partition {}: {}", quote(settings_.partition),
                    text.error().message);

@@ -45,8 +45,8 @@ struct RecordedNews {
 
 /// A recording, which is asked the same questions as a Client, without a network.
 ///
-/// It shows one instant: what the recorder knew then, in the structure that it knew then. seek()
-/// goes to another one. Answers are those that the live system gave at that instant, with
+/// A recording shows one instant: what the recorder knew then, in the structure that it knew then.
+/// seek() goes to another one. Answers are those that the live system gave at that instant, with
 /// covariance, sources and unspecified edges, up to rounding; but here the history is not limited
 /// to some seconds.
 ///

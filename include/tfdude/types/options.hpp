@@ -53,7 +53,7 @@ struct Options {
   std::string keys = keys_of_environment();
   Milliseconds timeout{1000};  ///< time limit of a call, see Client
   /// Maximum time that a new participant searches for others before it reports a frame as unknown.
-  /// It waits this long only if it discovers nobody. If it has discovered a participant that has
+  /// The whole time passes only if it discovers nobody. If it has discovered a participant that has
   /// not announced its structure, calls fail with kTimeout, for up to three times Options::timeout
   /// more.
   Milliseconds discovery{1000};
@@ -63,7 +63,7 @@ struct Options {
   /// for it and all frames below it; or the beginning of ids, followed by '*'. No entries: it only
   /// asks. Not for a Node, which needs all frames.
   ///
-  /// It asks an owner, which has a replica, for the frames that it needs, and keeps the answers. So
+  /// Such a client asks an owner, which has a replica, for frames, and keeps the answers. So
   /// the first call about a frame takes one more round trip. If a call fails with a kept answer, it
   /// asks again. find(), path(), parent() and exists() ask each time, and so does frames(), which
   /// lists what is followed and all frames above. A watched path takes a new route, and publish()

@@ -149,7 +149,7 @@ class Writer final : public edds::DataWriterListener {
   GrowingStamp source_stamp_;     // under writing_
 };
 
-/// Who has written a sample.
+/// The writer of a DDS sample.
 [[nodiscard]] inline const ertps::GUID_t& writer_of(const edds::SampleInfo& info) {
   return info.sample_identity.writer_guid();
 }

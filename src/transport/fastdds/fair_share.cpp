@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMemorySeconds = std::chrono::duration<double>(FairShare::kMemory).count();
 
-// Who takes less than this part of the time is not heavy.
+// A sender that takes less than this part of the time is not heavy.
 constexpr double kLight = 0.05;
 
 // Of the calling thread.

@@ -30,7 +30,7 @@ class FairShare {
   static constexpr std::chrono::milliseconds kMemory{50};
   /// The share of all heavy senders together. The rest of the time is needed to drop messages.
   static constexpr double kShare = 0.5;
-  /// Who has sent something within this time must not wait for others. A lone sender has no limit.
+  /// A sender is active for this time after a message. A lone sender has no limit.
   static constexpr std::chrono::seconds kActive{2};
 
   /// The calling thread begins or has ended handling a datagram.

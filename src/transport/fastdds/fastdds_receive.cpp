@@ -66,7 +66,7 @@ void FastDdsTransport::take_reply(const wire::Reply& sample, const edds::SampleI
     reply->sent = Time(std::chrono::nanoseconds(info.source_timestamp.to_ns()));
     handler_->on_reply(owner, *reply);
   } else {
-    // Who awaits it gets the error; if nobody does, a stranger has sent it.
+    // The caller that awaits it gets the error; if there is none, a stranger has sent it.
     if (reply.error().code != Errc::kUnsupported) log_refused(kReplyTopic, reply.error());
     handler_->on_reply(owner,
                        Reply{sample.sequence_number(), sample.epoch(), std::move(reply.error())});

@@ -189,7 +189,7 @@ std::pair<long, long> Peers::unknown_here() const {
   long least = 0;
   for (const auto& [id, server] : servers_) {
     if (server.silent) continue;
-    // It announces its number as it begins to claim its partition, before it has met anybody.
+    // An owner announces its number as it begins to claim its partition, before it hears others.
     if (!server.presence->serving) least = -1;
     const long more = static_cast<long>(server.peers) - others;
     most = std::max(most, more);

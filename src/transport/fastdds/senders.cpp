@@ -161,7 +161,7 @@ std::set<std::string> Senders::askable(const std::set<std::string>& partitions) 
   std::set<std::string> askable;
   if (!parts_.access.may_look()) return askable;
   for (const std::string& partition : partitions) {
-    // Who only sends a stream has none yet.
+    // A client that only sends streams has no writer yet.
     const auto writer = requests_.open(partition);
     if (writer->matched()) askable.insert(partition);
   }

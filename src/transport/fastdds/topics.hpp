@@ -37,7 +37,7 @@ struct Topics {
 /// Counts a sample that was dropped as not well formed, and logs the 1st, 2nd, 4th, 8th...
 void count_malformed(FastDdsCounters& counters, const char* topic);
 
-/// Logs why the content of a well-formed sample was refused.
+/// Logs why the content of a well-formed sample was rejected.
 void log_refused(const char* topic, const Error& error);
 
 }  // namespace tfdude::fastdds

@@ -312,7 +312,7 @@ TEST_CASE("axes of different size are distinguished down to rounding of the larg
 TEST_CASE("decimal rounding is accepted up to 1e-9 and rejected beyond") {
   // The tolerance: with every axis scaled to a variance of one, no eigenvalue below -1e-9. Rounding
   // to d digits moves each element by up to 5·10^-d of it, an eigenvalue by up to 6 times that:
-  // twelve digits always pass, six may well be refused, and whatever passes comes out
+  // twelve digits always pass, six may well be rejected, and whatever passes comes out
   // semi-definite.
   Random random(112);
   INFO("seed " << random.seed());

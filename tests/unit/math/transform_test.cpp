@@ -291,7 +291,7 @@ Transform planar_edge(Random& random, bool right_angles) {
 }
 
 TEST_CASE("every result is accepted as an input") {
-  // Answers travel and become edges elsewhere: the checks at the door must not refuse them.
+  // Answers travel and become edges elsewhere: the checks at the door must not reject them.
   Random random(251);
   INFO("seed " << random.seed());
   const bool right_angles = GENERATE(true, false);

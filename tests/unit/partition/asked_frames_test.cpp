@@ -133,8 +133,8 @@ TEST_CASE("asked frames: a participant without pages lacks none, and tells what 
   CHECK(asker.directory.complete());
   const auto arms = asker.directory.owner("arms");
   REQUIRE(arms);
-  CHECK(asker.directory.told_of(*arms, 5));
-  CHECK_FALSE(asker.directory.told_of(*arms, 5));
+  CHECK(asker.directory.note_announced_epoch(*arms, 5));
+  CHECK_FALSE(asker.directory.note_announced_epoch(*arms, 5));
   CHECK(asker.directory.behind() == nullptr);
   const auto seen = asker.asked.request({"hand"}, {}).seen;
   REQUIRE(seen.size() == 1);

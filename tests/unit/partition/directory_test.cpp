@@ -257,10 +257,10 @@ TEST_CASE("a directory is behind until an announced change has arrived") {
   replica.directory.apply(presence_of("arms", 1, 1), kNow);
   replica.directory.apply(Page{"arms", 0, 1, 2, {}});
   const Owner arms = *replica.directory.owner("arms");
-  replica.directory.told_of(arms, 2);
+  replica.directory.note_announced_epoch(arms, 2);
   CHECK(replica.directory.behind() == nullptr);
-  replica.directory.told_of(arms, 4);
-  replica.directory.told_of(arms, 3);
+  replica.directory.note_announced_epoch(arms, 4);
+  replica.directory.note_announced_epoch(arms, 3);
   REQUIRE(replica.directory.behind() != nullptr);
   CHECK(*replica.directory.behind() == "arms");
   SECTION("the change arrives") {

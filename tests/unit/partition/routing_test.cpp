@@ -163,13 +163,13 @@ TEST_CASE("a removal is rejected if the frame is unknown or its owner unreachabl
                      [](const Part& part) { return part.partition == "legs"; }));
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
   // The frame below may have been moved away.
-  known.directory.told_of(*known.directory.owner("legs"), 5);
+  known.directory.note_announced_epoch(*known.directory.owner("legs"), 5);
   CHECK(message_of(route_remove(known.forest, known.directory, "hand")) ==
         kLegsLost +
             std::string(", but its last change has not arrived here: which frames are below "
                         "'hand' is not certain"));
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "ok");
-  known.directory.told_of(*known.directory.owner("arms"), 5);
+  known.directory.note_announced_epoch(*known.directory.owner("arms"), 5);
   CHECK(outcome(route_remove(known.forest, known.directory, "gem")) == "timeout");
 }
 

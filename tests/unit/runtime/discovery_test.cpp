@@ -145,7 +145,8 @@ TEST_CASE("discovery: it waits for a change that an owner has announced but that
   REQUIRE(joiner.rig.discovery.complete());
   {
     const std::lock_guard lock(joiner.rig.structure.mutex);
-    joiner.rig.structure.directory.told_of(*joiner.rig.structure.directory.owner("arm"), 2);
+    joiner.rig.structure.directory.note_announced_epoch(
+        *joiner.rig.structure.directory.owner("arm"), 2);
   }
   CHECK_THAT(joiner.rig.discovery.await(Deadline(10ms)).error().message,
              ContainsSubstring("partition 'arm' has made a change that has not arrived here yet"));
