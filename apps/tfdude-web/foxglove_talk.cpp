@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 #include "foxglove_messages.hpp"
 #include "foxglove_request.hpp"
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../tfdude/joint_render.hpp"
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
+#include "../rendering/quantities.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -20,10 +20,9 @@ double rounded(double rate) {
 }
 
 nlohmann::json rate_json(const HistoryInfo& history) {
-  const double gap = static_cast<double>(history.mean_gap.count()) * 1e-9;
-  nlohmann::json json{{"hz", gap > 0 ? rounded(1 / gap) : 0}};
-  const std::uint64_t refused = history.refused_old + history.refused_equal + history.refused_ahead;
-  if (refused > 0) json["refused"] = refused;
+  nlohmann::json json{{"hz", rounded(cli::rate_of(history))}};
+  const std::uint64_t rejected = cli::rejected_of(history);
+  if (rejected > 0) json["refused"] = rejected;
   return json;
 }
 
@@ -128,7 +127,7 @@ void Live::ask_joints() {
 }
 
 void Live::note_refused(const std::string& partition, const HistoryInfo& history) {
-  const std::uint64_t refused = history.refused_old + history.refused_equal + history.refused_ahead;
+  const std::uint64_t refused = cli::rejected_of(history);
   const auto [known, is_first] = refused_.emplace(history.id, refused);
   const std::uint64_t before = is_first ? 0 : known->second;
   known->second = refused;

@@ -4,7 +4,7 @@
 
 #include "tfdude/types/version.hpp"
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 #include "request.hpp"
 
 namespace tfdude::web {

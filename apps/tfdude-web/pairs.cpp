@@ -2,8 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../tfdude/render.hpp"
-#include "../tfdude/uncertainty_render.hpp"
+#include "../rendering/json.hpp"
 
 namespace tfdude::web {
 namespace {

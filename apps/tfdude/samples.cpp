@@ -66,8 +66,7 @@ Result<void> check_keys(const Json& object, std::initializer_list<const char*> k
 }
 
 Result<EdgeUpdate> finish_edge(const std::string& id, TransformSpec spec, const AngleUnit& angles) {
-  to_radians(spec, angles);
-  auto X_PC = spec.build();
+  auto X_PC = in_radians(std::move(spec), angles).build();
   if (!X_PC) return fail_at("edge " + quote(id), X_PC.error());
   return EdgeUpdate{id, *X_PC};
 }

@@ -10,7 +10,7 @@
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/joint_spec.hpp"
 
-#include "angles.hpp"
+#include "../rendering/angles.hpp"
 
 // Samples of edges and joints as lines of text.
 namespace tfdude::cli {

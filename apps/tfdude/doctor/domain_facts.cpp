@@ -4,7 +4,8 @@
 
 #include "tfdude/client/client.hpp"
 
-#include "../commands.hpp"
+#include "../answer.hpp"
+#include "../stamps.hpp"
 #include "host_facts.hpp"
 
 namespace tfdude::cli {

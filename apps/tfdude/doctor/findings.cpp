@@ -4,7 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "../format.hpp"
+#include "../../rendering/format.hpp"
 #include "facts.hpp"
 
 // Each function judges one kind of facts, and adds what it finds.
