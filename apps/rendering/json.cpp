@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "quantities.hpp"
+#include "table.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -60,6 +61,14 @@ json lookup_json(const std::string& a, const std::string& b, const Transform& X_
               {"rotation", numbers_json(X_AB.pose.rotation().coeffs())},
               {"partitions", partitions}};
   add_covariance(object, X_AB.covariance);
+  return object;
+}
+
+json lookup_json(const std::string& a, const std::string& b, const StampedTransform& X_AB,
+                 const std::vector<PathSegment>& path) {
+  json object = lookup_json(a, b, X_AB, names_of(path, &PathSegment::partition));
+  add_stamp(object, X_AB.stamp);
+  object["basis"] = basis_json(X_AB.basis);
   return object;
 }
 

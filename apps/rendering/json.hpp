@@ -36,6 +36,10 @@ void add_stamp(nlohmann::json& object, const std::optional<Time>& stamp);
 [[nodiscard]] nlohmann::json lookup_json(const std::string& a, const std::string& b,
                                          const Transform& X_AB,
                                          const std::vector<std::string>& partitions);
+/// The same with the owners of its path, its stamp and what its covariance is based on.
+[[nodiscard]] nlohmann::json lookup_json(const std::string& a, const std::string& b,
+                                         const StampedTransform& X_AB,
+                                         const std::vector<PathSegment>& path);
 [[nodiscard]] nlohmann::json basis_json(const Basis& basis);
 [[nodiscard]] nlohmann::json frame_json(const Frame& frame);
 [[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);

@@ -92,7 +92,7 @@ void Live::ask_status() {
     if (!histories) continue;
     for (const HistoryInfo& history : *histories) {
       edges[history.id] = rate_json(history);
-      note_refused(partition.name, history);
+      note_rejected(partition.name, history);
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -126,13 +126,13 @@ void Live::ask_joints() {
   joints_ = {joints_.first + 1, std::make_shared<const std::string>(std::move(text))};
 }
 
-void Live::note_refused(const std::string& partition, const HistoryInfo& history) {
-  const std::uint64_t refused = cli::rejected_of(history);
-  const auto [known, is_first] = refused_.emplace(history.id, refused);
+void Live::note_rejected(const std::string& partition, const HistoryInfo& history) {
+  const std::uint64_t rejected = cli::rejected_of(history);
+  const auto [known, is_first] = rejected_.emplace(history.id, rejected);
   const std::uint64_t before = is_first ? 0 : known->second;
-  known->second = refused;
-  if (refused <= before) return;
-  const std::string message = std::to_string(refused - before) + " samples of '" + history.id +
+  known->second = rejected;
+  if (rejected <= before) return;
+  const std::string message = std::to_string(rejected - before) + " samples of '" + history.id +
                               "' were rejected by '" + partition + "' (" +
                               std::to_string(history.refused_old) + " too old, " +
                               std::to_string(history.refused_equal) + " of a taken stamp, " +

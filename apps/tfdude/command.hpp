@@ -10,8 +10,8 @@
 #include "../rendering/angles.hpp"
 #include "source.hpp"
 
-// What a command is. Each is a struct in a file of commands/: its constructor adds its options, and
-// its member functions answer. commands.cpp lists all of them.
+// Each command is a struct in a file of commands/: its constructor adds its options, and its member
+// functions answer. commands.cpp lists all of them.
 namespace tfdude::cli {
 
 /// The options that all commands have.
@@ -31,7 +31,7 @@ struct Command {
   /// Runs the command and prints its answer. @return the exit status
   [[nodiscard]] virtual int run(const Common& common) const = 0;
 
-  /// It ends when it is interrupted, so main() blocks the signals for that.
+  /// The command ends when it is interrupted, so main() blocks the signals for that.
   bool until_interrupted = false;
 };
 
@@ -46,7 +46,7 @@ struct LiveCommand : Command {
   /// @return the exit status, or kNeedsAllFrames
   [[nodiscard]] virtual int ask(Client& client, const Common& common) const = 0;
 
-  /// It is about one or two frames, and asks for them instead of receiving all frames.
+  /// The command is about one or two frames, and asks for them instead of receiving all frames.
   bool single_frames = false;
 };
 

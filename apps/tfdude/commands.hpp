@@ -4,8 +4,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "answer.hpp"
 #include "command.hpp"
+#include "options.hpp"
+#include "stamps.hpp"
 
+// All that the file of a command needs.
 namespace tfdude::cli {
 
 /// The commands of the program, and the one that the command line chooses.

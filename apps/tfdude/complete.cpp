@@ -180,7 +180,7 @@ Options options_among(const std::vector<std::string>& words) {
 }
 
 std::vector<Candidate> names_of(Completed kind, Options options) {
-  // Only for the case that nobody is there: otherwise discovery is complete sooner.
+  // Needed only if no partition answers: otherwise discovery is complete sooner.
   options.discovery = options.timeout = kCompletionTime / 2;
   auto client = Client::open(options);
   std::vector<Candidate> names;

@@ -11,8 +11,6 @@
 
 namespace tfdude::cli {
 
-void add_id(CLI::App& app, std::string& id) { app.add_option("ID", id, "the frame")->required(); }
-
 CLI::Option* add_stamp(CLI::App& app, const char* name, std::string& stamp, const char* help) {
   return app.add_option(name, stamp, help)
       ->type_name("SECONDS")

@@ -13,8 +13,17 @@
 // Options that several commands have.
 namespace tfdude::cli {
 
-/// Adds the frame that a command is about.
-void add_id(CLI::App& app, std::string& id);
+/// A command about one frame.
+struct FrameCommand : LiveCommand {
+  explicit FrameCommand(CLI::App& app) { app.add_option("ID", id, "the frame")->required(); }
+
+  std::string id;
+};
+
+/// A command that takes no arguments.
+struct PlainCommand : LiveCommand {
+  explicit PlainCommand(CLI::App& /*app*/) {}
+};
 
 /// Adds an option for a stamp, see parse_stamp().
 CLI::Option* add_stamp(CLI::App& app, const char* name, std::string& stamp, const char* help);

@@ -33,13 +33,8 @@ void Path::add_printing(CLI::App& app) {
 }
 
 nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
-  std::vector<std::string> partitions;
-  if (const auto path = source.path(a, b)) {
-    for (const PathSegment& segment : *path) partitions.push_back(segment.partition);
-  }
-  auto object = lookup_json(a, b, X_AB, partitions);
-  add_stamp(object, X_AB.stamp);
-  object["basis"] = basis_json(X_AB.basis);
+  const auto path = source.path(a, b).value_or(std::vector<PathSegment>());
+  auto object = lookup_json(a, b, X_AB, path);
   if (matrix) object["matrix"] = matrix_json(X_AB.pose.matrix());
   return object;
 }

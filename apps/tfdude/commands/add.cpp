@@ -1,13 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Add final : LiveCommand {
-  explicit Add(CLI::App& app) {
-    add_id(app, id);
+struct Add final : FrameCommand {
+  explicit Add(CLI::App& app) : FrameCommand(app) {
     app.add_option("--parent", parent, "its parent")->required();
     app.add_option("--partition", partition, "its owner, if not its parent's");
     add_pose(app, spec);
@@ -19,7 +16,6 @@ struct Add final : LiveCommand {
     return answer_done(client, common, client.add(id, parent, *X_PC, partition), "added", id);
   }
 
-  std::string id;
   std::string parent;
   std::string partition;
   TransformSpec spec;

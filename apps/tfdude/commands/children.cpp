@@ -1,20 +1,16 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Children final : LiveCommand {
-  explicit Children(CLI::App& app) { add_id(app, id); }
+struct Children final : FrameCommand {
+  using FrameCommand::FrameCommand;
 
   int ask(Client& client, const Common& common) const override {
     const auto children = client.children(id);
     if (!children) return report_cause(client, children.error(), common);
     return answer_list(common, "children", *children);
   }
-
-  std::string id;
 };
 
 }  // namespace

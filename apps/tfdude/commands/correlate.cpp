@@ -5,9 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "../../numbers.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -15,9 +13,8 @@ namespace {
 // Values of --source: the source's name, and one column of the loading.
 constexpr int kSourceSize = 7;
 
-struct Correlate final : LiveCommand {
-  explicit Correlate(CLI::App& app) {
-    add_id(app, id);
+struct Correlate final : FrameCommand {
+  explicit Correlate(CLI::App& app) : FrameCommand(app) {
     app.add_flag("--unknown", unknown,
                  "the edge's own error may be correlated with any other; default: independent");
     app.add_option(
@@ -65,7 +62,6 @@ struct Correlate final : LiveCommand {
     return errors;
   }
 
-  std::string id;
   bool unknown = false;
   std::vector<std::string> sources;  // for each column: its source's name and 6 numbers
 };

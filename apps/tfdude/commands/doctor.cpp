@@ -3,7 +3,6 @@
 #include "../../rendering/format.hpp"
 #include "../../rendering/quantities.hpp"
 #include "../../rendering/terminal.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
 #include "../doctor/domain_facts.hpp"
 
@@ -84,7 +83,7 @@ struct Doctor final : Command {
 }  // namespace
 
 void add_doctor(Commands& commands) {
-  commands.add<Doctor>("doctor", "find out why nobody is met, and what to do", "doctor");
+  commands.add<Doctor>("doctor", "find out why no partition answers, and what to do", "doctor");
 }
 
 }  // namespace tfdude::cli

@@ -8,11 +8,8 @@
 #include "../../rendering/screen.hpp"
 #include "../../rendering/table.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../path.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 

@@ -4,9 +4,7 @@
 
 #include "../../rendering/json.hpp"
 #include "../../stop_signals.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

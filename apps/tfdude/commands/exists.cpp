@@ -1,15 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Exists final : LiveCommand {
-  explicit Exists(CLI::App& app) {
-    single_frames = true;
-    add_id(app, id);
-  }
+struct Exists final : FrameCommand {
+  explicit Exists(CLI::App& app) : FrameCommand(app) { single_frames = true; }
 
   int ask(Client& client, const Common& common) const override {
     const auto parent = client.parent(id);
@@ -21,8 +16,6 @@ struct Exists final : LiveCommand {
     (void)answer(common, {{"id", id}, {"exists", exists}}, exists ? "yes\n" : "no\n");
     return exists ? kDone : kRejected;
   }
-
-  std::string id;
 };
 
 }  // namespace

@@ -1,4 +1,3 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
 
 namespace tfdude::cli {

@@ -1,4 +1,3 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
 #include "../structure.hpp"
 

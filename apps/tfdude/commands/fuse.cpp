@@ -1,15 +1,11 @@
 #include "../commands.hpp"
 #include "../measurement.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Fuse final : LiveCommand {
-  explicit Fuse(CLI::App& app) {
-    add_id(app, id);
-    measured.add_options(app);
-  }
+struct Fuse final : FrameCommand {
+  explicit Fuse(CLI::App& app) : FrameCommand(app) { measured.add_options(app); }
 
   int ask(Client& client, const Common& common) const override {
     return measured.send(client, common, [&](const Transform& X_PC, std::optional<Time> stamp) {
@@ -17,7 +13,6 @@ struct Fuse final : LiveCommand {
     });
   }
 
-  std::string id;
   Measurement measured;
 };
 

@@ -5,11 +5,8 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../picture.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

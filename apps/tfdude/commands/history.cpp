@@ -4,10 +4,7 @@
 #include "../../rendering/json.hpp"
 #include "../../rendering/quantities.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 
@@ -31,8 +28,8 @@ std::string describe(const HistoryInfo& history, std::optional<Time> now) {
 
 namespace {
 
-struct History final : LiveCommand {
-  explicit History(CLI::App& app) { add_id(app, id); }
+struct History final : FrameCommand {
+  using FrameCommand::FrameCommand;
 
   int ask(Client& client, const Common& common) const override {
     const auto histories = client.history(id);
@@ -64,8 +61,6 @@ struct History final : LiveCommand {
                   {{"id", id}, {"moving", dynamic}, {"samples", 0}, {"refused_ahead", rejected}},
                   text);
   }
-
-  std::string id;
 };
 
 }  // namespace

@@ -4,9 +4,7 @@
 #include "../../rendering/format.hpp"
 #include "../../rendering/json.hpp"
 #include "../../rendering/quantities.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {

@@ -5,13 +5,10 @@
 #include "../../numbers.hpp"
 #include "../../rendering/format.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
 #include "../known_joints.hpp"
-#include "../options.hpp"
 #include "../samples.hpp"
 #include "../sending.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 

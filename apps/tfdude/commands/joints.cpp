@@ -8,9 +8,7 @@
 #include "../../rendering/table.hpp"
 #include "../../rendering/terminal.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {

@@ -7,9 +7,7 @@
 #include "tfdude/keys/key_store.hpp"
 
 #include "../../rendering/json.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

@@ -1,10 +1,7 @@
 #include "../../rendering/screen.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../path.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

@@ -10,10 +10,7 @@
 #include "../../rendering/table.hpp"
 #include "../../rendering/terminal.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

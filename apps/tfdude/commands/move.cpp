@@ -1,13 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Move final : LiveCommand {
-  explicit Move(CLI::App& app) {
-    add_id(app, id);
+struct Move final : FrameCommand {
+  explicit Move(CLI::App& app) : FrameCommand(app) {
     app.add_option("--parent", parent, "the new parent")->required();
     add_pose(app, spec);
   }
@@ -18,7 +15,6 @@ struct Move final : LiveCommand {
     return answer_done(client, common, client.move(id, parent, *parts), "moved", id);
   }
 
-  std::string id;
   std::string parent;
   TransformSpec spec;
 };

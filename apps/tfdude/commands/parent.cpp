@@ -1,12 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Parent final : LiveCommand {
-  explicit Parent(CLI::App& app) { add_id(app, id); }
+struct Parent final : FrameCommand {
+  using FrameCommand::FrameCommand;
 
   int ask(Client& client, const Common& common) const override {
     const auto parent = client.parent(id);
@@ -15,8 +13,6 @@ struct Parent final : LiveCommand {
     return answer(common, {{"id", id}, {"parent", json}},
                   (parent->empty() ? "(root)" : *parent) + "\n");
   }
-
-  std::string id;
 };
 
 }  // namespace

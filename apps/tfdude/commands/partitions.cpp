@@ -4,7 +4,6 @@
 #include "../../rendering/json.hpp"
 #include "../../rendering/table.hpp"
 #include "../../rendering/terminal.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
 
 namespace tfdude::cli {
@@ -56,8 +55,8 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
 
 namespace {
 
-struct Partitions final : LiveCommand {
-  explicit Partitions(CLI::App& /*app*/) {}
+struct Partitions final : PlainCommand {
+  using PlainCommand::PlainCommand;
 
   int ask(Client& client, const Common& common) const override {
     const auto partitions = client.partitions();

@@ -6,12 +6,9 @@
 #include "tfdude/base/id.hpp"
 
 #include "../../rendering/json.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../path.hpp"
 #include "../picture.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

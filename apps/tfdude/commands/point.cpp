@@ -3,11 +3,8 @@
 #include "../../rendering/format.hpp"
 #include "../../rendering/json.hpp"
 #include "../../rendering/text.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../path.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {

@@ -1,5 +1,4 @@
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../sending.hpp"
 
 namespace tfdude::cli {

@@ -1,27 +1,22 @@
-#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <map>
 #include <mutex>
 #include <set>
-#include <thread>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/recording/recording_writer.hpp"
 
-#include "../answer.hpp"
+#include "../../worker.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {
 
 constexpr double kFlushEvery = 0.8;  // [s]: with what that takes, at most a second is lost
-constexpr double kTick = 0.1;        // [s]
-constexpr int kTicksBetweenLooks = 2;
+constexpr std::chrono::milliseconds kRefreshEvery{200};
 
-// Passes what a client hears to a file. All functions are thread-safe.
+// Writes the news of all partitions to a file. All functions are thread-safe.
 class Recorder {
  public:
   Recorder(Client& client, ClockKind clock, RecordingWriter writer)
@@ -51,7 +46,7 @@ class Recorder {
   }
 
   // The joints of all partitions; and those that could not be watched are tried again.
-  void look_again() {
+  void refresh() {
     const auto partitions = client_.partitions();
     if (!partitions) return;
     for (const PartitionInfo& partition : *partitions) {
@@ -123,17 +118,12 @@ Result<void> record(Client& client, Recorder& recorder, const Common& common) {
     for (const PartitionInfo& partition : *partitions) recorder.watch(partition.name);
   }
   // On its own thread, because an owner that does not answer is waited for.
-  std::atomic<bool> stopping{false};
-  std::thread looking([&] {
-    for (int ticks = 0; !stopping; ++ticks) {
-      if (ticks % kTicksBetweenLooks == 0) recorder.look_again();
-      std::this_thread::sleep_for(std::chrono::duration<double>(kTick));
-    }
-  });
+  Worker worker;
+  worker.post([&] { recorder.refresh(); });
+  worker.repeat(kRefreshEvery, [&] { recorder.refresh(); });
   Result<void> written;
   while (written && !interrupted_within(kFlushEvery)) written = recorder.flush();
-  stopping = true;
-  looking.join();
+  worker.stop();
   changes = Subscription();
   if (!recorder.has_partition()) std::fputs("tfdude: no partition was recorded\n", stderr);
   return recorder.finish();

@@ -1,18 +1,14 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Remove final : LiveCommand {
-  explicit Remove(CLI::App& app) { add_id(app, id); }
+struct Remove final : FrameCommand {
+  using FrameCommand::FrameCommand;
 
   int ask(Client& client, const Common& common) const override {
     return answer_done(client, common, client.remove(id), "removed", id);
   }
-
-  std::string id;
 };
 
 }  // namespace

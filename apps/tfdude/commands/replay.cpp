@@ -10,18 +10,15 @@
 #include "tfdude/recording/recording.hpp"
 
 #include "../../rendering/format.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../replayed_partition.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {
 
 using Steady = std::chrono::steady_clock;
 
-// In its own domain unless another one is given, so that nobody takes a replay for the robot.
+// In its own domain unless another one is given, so that a replay is not taken for the robot.
 constexpr std::uint32_t kReplayDomain = 77;
 constexpr double kStep = 0.005;                       // [s]
 constexpr std::chrono::milliseconds kClockEvery{10};  // while time passes
@@ -128,15 +125,15 @@ class Replay {
 
   [[nodiscard]] Result<void> show_state();
   [[nodiscard]] Result<void> open(const std::string& name, One& one);
-  [[nodiscard]] Result<void> take(const RecordedNews& recorded);
-  [[nodiscard]] Result<void> take_due(Time due);
+  [[nodiscard]] Result<void> apply(const RecordedNews& recorded);
+  [[nodiscard]] Result<void> apply_due(Time due);
   [[nodiscard]] Result<void> settle();
   void show_joints();
   [[nodiscard]] Result<void> set_back();
   void close(One& one);
   void fetch();
   [[nodiscard]] Result<void> publish_clock(Time now);
-  void obey(char key);
+  void on_key(char key);
 
   Recording& recording_;
   Client& clock_;
@@ -195,8 +192,8 @@ Result<void> Replay::show_state() {
     } else if (!one.served || !one.reachable) {
       continue;
     } else if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
-      one.served->take(*frames);
-    } else if (auto ok = one.served->take(std::get<ValuesNews>(news.what)); !ok) {
+      one.served->apply(*frames);
+    } else if (auto ok = one.served->apply(std::get<ValuesNews>(news.what)); !ok) {
       return ok;
     }
   }
@@ -216,7 +213,7 @@ Result<void> Replay::begin() {
   return {};
 }
 
-Result<void> Replay::take(const RecordedNews& recorded) {
+Result<void> Replay::apply(const RecordedNews& recorded) {
   const PartitionNews& news = recorded.news;
   One& one = partitions_[news.partition];
   if (const auto* reach = std::get_if<ReachNews>(&news.what)) {
@@ -227,12 +224,12 @@ Result<void> Replay::take(const RecordedNews& recorded) {
   }
   if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
     one.since = recorded.time;
-    if (one.served) one.served->take(*frames);
+    if (one.served) one.served->apply(*frames);
     return {};
   }
   if (!one.reachable) return {};
   if (!one.served) return open(news.partition, one);
-  return one.served->take(std::get<ValuesNews>(news.what));
+  return one.served->apply(std::get<ValuesNews>(news.what));
 }
 
 // Frames without values.
@@ -248,10 +245,10 @@ Result<void> Replay::settle() {
   return {};
 }
 
-Result<void> Replay::take_due(Time due) {
+Result<void> Replay::apply_due(Time due) {
   while (!upcoming_.empty() && upcoming_.front().time <= due) {
     for (const RecordedNews& news : upcoming_) {
-      if (auto ok = take(news); !ok) return ok;
+      if (auto ok = apply(news); !ok) return ok;
     }
     if (Steady::now() - published_ >= kClockEvery) {
       if (auto ok = publish_clock(upcoming_.front().time); !ok) return ok;
@@ -263,7 +260,7 @@ Result<void> Replay::take_due(Time due) {
 
 void Replay::pause(bool paused) { pace_.pause(paused); }
 
-void Replay::obey(char key) {
+void Replay::on_key(char key) {
   if (key != ' ') return;
   pause(!pace_.paused());
   std::fputs(pace_.paused() ? "tfdude: paused\n" : "tfdude: going on\n", stderr);
@@ -277,7 +274,7 @@ void Replay::show_joints() {
   }
 }
 
-// First where it is expected, so that nobody in this process is surprised by it.
+// First in the partitions of this process, which expect the time to jump back.
 Result<void> Replay::set_back() {
   std::fputs("tfdude: from the beginning\n", stderr);
   for (auto& [name, one] : partitions_) {
@@ -290,9 +287,9 @@ Result<void> Replay::set_back() {
 Result<void> Replay::run() {
   Keys keys;
   while (!interrupted_within(kStep)) {
-    while (const auto key = keys.next()) obey(*key);
+    while (const auto key = keys.next()) on_key(*key);
     const Time due = std::min(pace_.now(), end_);
-    if (auto ok = take_due(due); !ok) return ok;
+    if (auto ok = apply_due(due); !ok) return ok;
     if (auto ok = settle(); !ok) return ok;
     if (Steady::now() - shown_ >= kRepeatEvery) show_joints();
     if (Steady::now() - published_ >= (pace_.paused() ? kRepeatEvery : kClockEvery)) {

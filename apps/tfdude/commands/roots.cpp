@@ -1,11 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Roots final : LiveCommand {
-  explicit Roots(CLI::App& /*app*/) {}
+struct Roots final : PlainCommand {
+  using PlainCommand::PlainCommand;
 
   int ask(Client& client, const Common& common) const override {
     const auto roots = client.roots();

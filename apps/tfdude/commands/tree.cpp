@@ -5,9 +5,7 @@
 
 #include "../../rendering/screen.hpp"
 #include "../../rendering/terminal.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../structure.hpp"
 
 namespace tfdude::cli {

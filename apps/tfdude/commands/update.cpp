@@ -1,14 +1,10 @@
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-struct Update final : LiveCommand {
-  explicit Update(CLI::App& app) {
-    add_id(app, id);
+struct Update final : FrameCommand {
+  explicit Update(CLI::App& app) : FrameCommand(app) {
     add_pose(app, spec);
     add_sample_stamp(app, stamp);
   }
@@ -21,7 +17,6 @@ struct Update final : LiveCommand {
     return answer_done(client, common, client.update_partial({{id, *parts}}, *at), "updated", id);
   }
 
-  std::string id;
   TransformSpec spec;
   std::string stamp;
 };

@@ -4,11 +4,8 @@
 
 #include "../../rendering/format.hpp"
 #include "../../rendering/json.hpp"
-#include "../answer.hpp"
 #include "../commands.hpp"
-#include "../options.hpp"
 #include "../path.hpp"
-#include "../stamps.hpp"
 
 namespace tfdude::cli {
 
