@@ -100,7 +100,10 @@ class Pages : private CLI::Formatter {
     options(out, app, "OPTIONS", false);
     const auto commands = commands_of(app);
     if (!commands.empty()) out << ".SH COMMANDS\n";
+    std::string group = "Subcommands";  // CLI11's name for those without a group
     for (const CLI::App* command : commands) {
+      if (command->get_group() != group)
+        out << ".SS " << escaped(group = command->get_group()) << "\n";
       out << ".TP\n.BR " << escaped(page + "-" + command->get_name()) << " (1)\n"
           << escaped(command->get_description()) << '\n';
     }

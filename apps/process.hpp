@@ -16,24 +16,12 @@
 #include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
+#include "exit_status.hpp"
 #include "service_manager.hpp"
+#include "stop_signals.hpp"
 
 // What the programs that serve a partition have in common as processes.
 namespace tfdude::cli {
-
-/// The exit status if a program could not start, or has lost its partition.
-inline constexpr int kRefused = 1;
-
-/// Blocks the signals to stop. Call it before any thread starts: all threads inherit this, so
-/// sigwait() gets the signals.
-inline sigset_t block_stop_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
-}
 
 /// Logs go to standard error, those of the library, too, which uses the logger of this name. If
 /// nobody reads the log, lines are lost rather than delaying the program. The journal gets
@@ -78,7 +66,7 @@ inline void log_to_standard_error() {
   notify("READY=1\nSTATUS=serving partition " + quote(node.partition()));
   const int signal = wait_for_signal(node, stop_signals);
   notify("STOPPING=1");
-  if (given_up) return kRefused;
+  if (given_up) return kRejected;
   spdlog::info("stopping on signal {}", signal);
   return 0;
 }

@@ -64,6 +64,11 @@ LOCALE_FORMAT = re.compile(r'"(?:\\.|[^"\\\n])*%[-+#0]*[0-9*]*(\.[0-9*]+)?l?[aef
 # Read words, or in the locale of C.
 LOCALE_FREE = ["src/description/yaml_quirks.cpp", "src/keys/authority.cpp", "src/transport/fastdds/announcement.cpp"]
 
+# Each program has a folder in apps, and uses no other's. They share the files in apps itself, and rendering, which uses
+# none of them. A command of the command line uses no other command.
+SHARED_RENDERING = "apps/rendering"
+COMMAND = "apps/tfdude/commands/"
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 COMMENT_OR_LITERAL = re.compile(
     r'//[^\n]*|/\*.*?\*/|R"([^(\s]*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', re.DOTALL)
@@ -82,6 +87,12 @@ def layer_of(path):
     match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps|python)/", path)
     name = match and (match[1] or match[2])
     return name if name in LAYERS else None
+
+
+def room_of(path):
+    """The folder of a program, or that of rendering; None for other files."""
+    match = re.match(r"(apps/[^/]+)/", path)
+    return match and match[1]
 
 
 class Checker:
@@ -146,6 +157,12 @@ class Checker:
             self.report(path, position, "arrow", f'{layer} may not include "{name}" of {other}')
         if path.startswith("include/") and not target.startswith("include/"):
             self.report(path, position, "public", f'a public header includes the private "{name}"')
+        here, there = room_of(path), room_of(target)
+        if here and there and here != there and there != SHARED_RENDERING:
+            self.report(path, position, "room", f'{here} may not include "{name}" of {there}')
+        command = re.match(COMMAND + r"(\w+)\.", path)
+        if command and re.match(COMMAND, target) and not re.match(COMMAND + command[1] + r"\.", target):
+            self.report(path, position, "room", f'a command may not include "{name}" of another one')
         shares = any(path.startswith(place) and target in shared for place, shared in SHARED.items())
         if layer in USERS and target.startswith("src/") and not target.startswith(DDS_FOLDER) and not shares:
             self.report(path, position, "public", f'a program includes the private "{name}"')
@@ -219,6 +236,10 @@ class SelfTest(unittest.TestCase):
         "src/description/config.cpp": "#include <yaml-cpp/yaml.h>\n",
         "src/runtime/loop.cpp": 'auto t = Clock::now();\n#include <thread>\nlog("50 % of 3", "%04o");\n',
         "apps/tfdude/main.cpp": '#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n#include "tool.hpp"\n',
+        "apps/tfdude/commands/tree.hpp": '#include "../../rendering/text.hpp"\n#include "../../worker.hpp"\n',
+        "apps/tfdude/commands/tree.cpp": '#include "tree.hpp"\n#include "../tool.hpp"\n',
+        "apps/rendering/text.hpp": "#include <string>\n",
+        "apps/worker.hpp": "#include <thread>\n",
         "python/src/module.cpp": '#include <pybind11/pybind11.h>\n#include "tfdude/tree/forest.hpp"\n',
         "apps/tfdude/tool.hpp": '#include "tfdude/tree/forest.hpp"\n',
         "src/transport/fastdds/compat.hpp": "#include <fastdds/dds/core.hpp>\n",
@@ -262,6 +283,9 @@ class SelfTest(unittest.TestCase):
         ("arrow", "src/store/a.cpp", '#include "tfdude/transport/port.hpp"\n'),
         ("confined", "src/client/a.cpp", "#include <nlohmann/json.hpp>\n"),
         ("confined", "src/client/a.cpp", "#include <pybind11/numpy.h>\n"),
+        ("room", "apps/tfdude-web/a.cpp", '#include "../tfdude/tool.hpp"\n'),
+        ("room", "apps/rendering/a.cpp", '#include "../tfdude/tool.hpp"\n'),
+        ("room", "apps/tfdude/commands/frames.cpp", '#include "tree.hpp"\n'),
         ("math", "src/math/a.cpp", "#include <tl/expected.hpp>\n"),
         ("math", "src/math/a.cpp", "#include <unistd.h>\n"),
         ("barred", "src/partition/a.cpp", "int a;  // fine\n#include <thread>\n"),

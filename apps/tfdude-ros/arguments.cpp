@@ -10,10 +10,9 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/types/version.hpp"
 
+#include "../command_line.hpp"
 #include "../environment.hpp"
-#include "../manual.hpp"
 #include "../network_options.hpp"
-#include "../numbers.hpp"
 #include "config/config.hpp"
 
 namespace tfdude::ros {
@@ -125,19 +124,12 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   app.set_version_flag("--version", version_line());
   Options options(app);
   cli::add_network_options(app, settings.options);
-  cli::require_numbers(app);
-  cli::add_manual(app);
-  try {
-    app.name(argv[0]);
-    app.parse(cli::arguments_of(argc, argv));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
-  }
+  if (const auto status = cli::read_command_line(app, argc, argv)) return status;
   auto read = read_environment(cli::environment, settings);
   if (read) read = options.apply(settings);
   if (read) return std::nullopt;
   std::fprintf(stderr, "tfdude-ros: %s\n", read.error().message.c_str());
-  return kWrongUsage;
+  return cli::kWrongUsage;
 }
 
 }  // namespace tfdude::ros

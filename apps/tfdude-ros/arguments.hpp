@@ -6,8 +6,6 @@
 
 namespace tfdude::ros {
 
-inline constexpr int kWrongUsage = 2;
-
 /// Prints help and errors of usage itself.
 /// @return the exit status if the program should end: after help or wrong usage
 [[nodiscard]] std::optional<int> read_arguments(int argc, char** argv, Settings& settings);

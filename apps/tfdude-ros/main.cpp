@@ -14,9 +14,9 @@
 
 namespace {
 
-using tfdude::cli::kRefused;
+using tfdude::cli::kRejected;
+using tfdude::cli::kWrongUsage;
 using tfdude::ros::Bridge;
-using tfdude::ros::kWrongUsage;
 using tfdude::ros::Settings;
 
 int serve(const Settings& settings, const sigset_t& stop_signals) {
@@ -25,7 +25,7 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
     spdlog::error("{}", bridge.error().message);
     const auto code = bridge.error().code;
     return code == tfdude::Errc::kConfig || code == tfdude::Errc::kInvalidInput ? kWrongUsage
-                                                                                : kRefused;
+                                                                                : kRejected;
   }
   std::printf("ready partition=%s ros_domain=%u\n", settings.partition.c_str(),
               settings.ros_domain);

@@ -2,9 +2,8 @@
 
 #include "tfdude/types/version.hpp"
 
-#include "../manual.hpp"
+#include "../command_line.hpp"
 #include "../network_options.hpp"
-#include "../numbers.hpp"
 #include "settings.hpp"
 
 namespace tfdude::web {
@@ -36,15 +35,7 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
       ->allow_extra_args(false);
   cli::add_network_options(app, settings.options);
   cli::add_clock_option(app, [&](ClockKind kind) { settings.options.clock = kind; });
-  cli::require_numbers(app);
-  cli::add_manual(app);
-  try {
-    app.name(argv[0]);
-    app.parse(cli::arguments_of(argc, argv));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
-  }
-  return std::nullopt;
+  return cli::read_command_line(app, argc, argv);
 }
 
 }  // namespace tfdude::web

@@ -6,7 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 
 namespace tfdude::web::foxglove {
 namespace {

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 #include "foxglove_messages.hpp"
 #include "foxglove_request.hpp"
 
@@ -81,7 +81,7 @@ class FoxgloveTalk final : public Talk {
     if (!subscriptions_.emplace(id, channel).second) {
       return warn("subscription " + std::to_string(id) + " exists");
     }
-    // Whoever begins gets the last value of each edge, also of static ones.
+    // A new subscription gets the last value of each edge, also of static ones.
     if (channel == kTransforms || channel == kTf) seen_[channel] = 0;
     if (channel == kScene) scene_due_ = true;
     if (channel >= kFirstPair) pairs_.at(channel).number = 0;

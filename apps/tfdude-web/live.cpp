@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../tfdude/joint_render.hpp"
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
+#include "../rendering/quantities.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -20,10 +20,9 @@ double rounded(double rate) {
 }
 
 nlohmann::json rate_json(const HistoryInfo& history) {
-  const double gap = static_cast<double>(history.mean_gap.count()) * 1e-9;
-  nlohmann::json json{{"hz", gap > 0 ? rounded(1 / gap) : 0}};
-  const std::uint64_t refused = history.refused_old + history.refused_equal + history.refused_ahead;
-  if (refused > 0) json["refused"] = refused;
+  nlohmann::json json{{"hz", rounded(cli::rate_of(history))}};
+  const std::uint64_t rejected = cli::rejected_of(history);
+  if (rejected > 0) json["refused"] = rejected;
   return json;
 }
 
@@ -93,7 +92,7 @@ void Live::ask_status() {
     if (!histories) continue;
     for (const HistoryInfo& history : *histories) {
       edges[history.id] = rate_json(history);
-      note_refused(partition.name, history);
+      note_rejected(partition.name, history);
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -127,13 +126,13 @@ void Live::ask_joints() {
   joints_ = {joints_.first + 1, std::make_shared<const std::string>(std::move(text))};
 }
 
-void Live::note_refused(const std::string& partition, const HistoryInfo& history) {
-  const std::uint64_t refused = history.refused_old + history.refused_equal + history.refused_ahead;
-  const auto [known, is_first] = refused_.emplace(history.id, refused);
+void Live::note_rejected(const std::string& partition, const HistoryInfo& history) {
+  const std::uint64_t rejected = cli::rejected_of(history);
+  const auto [known, is_first] = rejected_.emplace(history.id, rejected);
   const std::uint64_t before = is_first ? 0 : known->second;
-  known->second = refused;
-  if (refused <= before) return;
-  const std::string message = std::to_string(refused - before) + " samples of '" + history.id +
+  known->second = rejected;
+  if (rejected <= before) return;
+  const std::string message = std::to_string(rejected - before) + " samples of '" + history.id +
                               "' were rejected by '" + partition + "' (" +
                               std::to_string(history.refused_old) + " too old, " +
                               std::to_string(history.refused_equal) + " of a taken stamp, " +

@@ -78,7 +78,7 @@ class Live {
   void follow_partitions();
   void ask_status();
   void ask_joints();
-  void note_refused(const std::string& partition, const HistoryInfo& history);
+  void note_rejected(const std::string& partition, const HistoryInfo& history);
   void add_event(const Change& change);
   void add_event(Event event);
   Text made_since(std::uint64_t picture, std::map<std::uint64_t, Text>& made,
@@ -101,7 +101,7 @@ class Live {
 
   // Of the worker's thread.
   std::map<std::string, PartitionWatch> watches_;
-  std::map<std::string, std::uint64_t> refused_;
+  std::map<std::string, std::uint64_t> rejected_;
 
   mutable std::mutex mutex_;
   std::deque<Event> events_;

@@ -102,7 +102,7 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
                     : tl::unexpected(files.error());
   if (!live) {
     spdlog::error("{}", live.error().message);
-    return live.error().code == Errc::kConfig ? web::kWrongUsage : cli::kRefused;
+    return live.error().code == Errc::kConfig ? cli::kWrongUsage : cli::kRejected;
   }
   Access access;
   access.loopback = is_loopback(settings.server.address);
@@ -113,7 +113,7 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
   });
   if (!opened) {
     spdlog::error("{}", opened.error().message);
-    return opened.error().code == Errc::kInvalidInput ? web::kWrongUsage : cli::kRefused;
+    return opened.error().code == Errc::kInvalidInput ? cli::kWrongUsage : cli::kRejected;
   }
   web::Server& server = **opened;
   const bool six = settings.server.address.find(':') != std::string::npos;

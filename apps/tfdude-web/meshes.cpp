@@ -13,7 +13,7 @@
 
 #include "tfdude/math/pose.hpp"
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 
 namespace tfdude::web {
 namespace {

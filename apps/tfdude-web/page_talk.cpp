@@ -4,7 +4,7 @@
 
 #include "tfdude/types/version.hpp"
 
-#include "../tfdude/render.hpp"
+#include "../rendering/json.hpp"
 #include "request.hpp"
 
 namespace tfdude::web {
@@ -41,7 +41,7 @@ class PageTalk final : public Talk {
     } else if (const auto* past = std::get_if<PastRequest>(&*request)) {
       past_ = past->at;
       past_due_ = true;
-      if (link_->waiting() <= kBehind) tell_past();
+      if (link_->waiting() <= kBehind) send_past();
       ask();
     } else {
       past_.reset();
@@ -55,10 +55,10 @@ class PageTalk final : public Talk {
 
   void tick() override {
     if (link_->waiting() > kBehind) return;
-    tell_structure();
-    tell_events();
-    tell_status();
-    if (past_due_) tell_past();
+    send_structure();
+    send_events();
+    send_status();
+    if (past_due_) send_past();
     if (past_) return;
     if (pair_ && pair_->number() != pair_number_) {
       pair_number_ = pair_->number();
@@ -78,7 +78,7 @@ class PageTalk final : public Talk {
     if (text) link_->send(text, false);
   }
 
-  void tell_structure() {
+  void send_structure() {
     const Text structure = live_.structure();
     if (live_.structure_number() == structure_) return;
     structure_ = live_.structure_number();
@@ -88,16 +88,16 @@ class PageTalk final : public Talk {
     past_due_ = past_.has_value();
   }
 
-  void tell_past() {
+  void send_past() {
     past_due_ = false;
     for (std::string& part : live_.world().at(*past_)) {
       link_->send(std::make_shared<const std::string>(std::move(part)), true);
     }
   }
 
-  void tell_status() {
+  void send_status() {
     const auto [number, change] = live_.status_change();
-    // Who has missed a change needs all.
+    // A page that has missed a change needs all.
     if (number != status_) send(number == status_ + 1 ? change : live_.status());
     status_ = number;
     const auto [joints_number, joints] = live_.joints();
@@ -105,7 +105,7 @@ class PageTalk final : public Talk {
     joints_ = joints_number;
   }
 
-  void tell_events() {
+  void send_events() {
     const auto events = live_.events_after(events_);
     if (events.empty()) return;
     nlohmann::json list = nlohmann::json::array();

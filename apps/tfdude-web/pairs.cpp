@@ -2,8 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../tfdude/render.hpp"
-#include "../tfdude/uncertainty_render.hpp"
+#include "../rendering/json.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -104,21 +103,15 @@ Text Pairs::text_of(const std::string& a, const std::string& b,
                     const Result<StampedTransform>& X_AB, bool past,
                     const std::string& unreachable) const {
   nlohmann::json json;
-  const auto path = client_.path(a, b);
-  std::vector<std::string> partitions;
+  const auto path = client_.path(a, b).value_or(std::vector<PathSegment>());
   nlohmann::json segments = nlohmann::json::array();
-  if (path) {
-    for (const PathSegment& segment : *path) {
-      partitions.push_back(segment.partition);
-      segments.push_back(
-          {{"partition", segment.partition}, {"from", segment.from}, {"to", segment.to}});
-    }
+  for (const PathSegment& segment : path) {
+    segments.push_back(
+        {{"partition", segment.partition}, {"from", segment.from}, {"to", segment.to}});
   }
   if (X_AB) {
-    json = cli::lookup_json(a, b, *X_AB, partitions);
-    cli::add_stamp(json, X_AB->stamp);
+    json = cli::lookup_json(a, b, *X_AB, path);
     if (X_AB->stamp) json["stamp_ns"] = std::to_string(nanoseconds(*X_AB->stamp));
-    json["basis"] = cli::basis_json(X_AB->basis);
   } else {
     json = {{"from", a},
             {"to", b},

@@ -135,11 +135,11 @@ class Connection final : public Link, public std::enable_shared_from_this<Connec
       const bool good = self->accepted_.talk->receive(message, self->stream_.got_binary());
       self->buffer_.consume(self->buffer_.size());
       if (good) return self->read();
-      self->refuse();
+      self->reject();
     });
   }
 
-  void refuse() {
+  void reject() {
     stream_.async_close(websocket::close_code::bad_payload,
                         [self = shared_from_this()](error_code) { self->end(); });
   }

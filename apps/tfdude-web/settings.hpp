@@ -10,9 +10,6 @@
 
 namespace tfdude::web {
 
-/// The exit status of a wrong command line.
-inline constexpr int kWrongUsage = 2;
-
 struct Settings {
   Options options;
   ServerSettings server;

@@ -10,9 +10,9 @@
 
 #include "tfdude/client/client.hpp"
 
+#include "../exit_status.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
-#include "command_options.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -180,7 +180,7 @@ Options options_among(const std::vector<std::string>& words) {
 }
 
 std::vector<Candidate> names_of(Completed kind, Options options) {
-  // Only for the case that nobody is there: otherwise discovery is complete sooner.
+  // Needed only if no partition answers: otherwise discovery is complete sooner.
   options.discovery = options.timeout = kCompletionTime / 2;
   auto client = Client::open(options);
   std::vector<Candidate> names;
@@ -238,7 +238,7 @@ void complete(CLI::App& app, const std::vector<std::string>& words) {
                      completion.kind == Completed::kJoints;
   if (names) {
     log_fastdds_to_standard_error();
-    // Whoever types waits for it: whatever hangs, it ends.
+    // The shell waits for the answer: this process ends after kCompletionTime, whatever hangs.
     std::thread([] {
       std::this_thread::sleep_for(kCompletionTime);
       _exit(kDone);

@@ -14,7 +14,8 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "commands.hpp"
+#include "../stop_signals.hpp"
+#include "answer.hpp"
 
 namespace tfdude::cli {
 
@@ -23,7 +24,7 @@ Result<Lines> Lines::open(const std::string& file, std::optional<double> pace) {
   if (opened < 0) {
     return fail(Errc::kConfig, "cannot read " + quote(file) + ": " + std::strerror(errno));
   }
-  const sigset_t signals = signals_to_stop();
+  const sigset_t signals = stop_signals();
   return Lines(opened, signalfd(-1, &signals, SFD_CLOEXEC), pace);
 }
 

@@ -77,11 +77,13 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
   partition.frames_ = frames.frames;
   partition.rejected_ = rejected;
   partition.served_ = std::move(served);
-  if (auto taken = partition.take(values); !taken) return tl::unexpected(std::move(taken.error()));
+  if (auto applied = partition.apply(values); !applied) {
+    return tl::unexpected(std::move(applied.error()));
+  };
   return partition;
 }
 
-void ReplayedPartition::take(const FramesNews& frames) {
+void ReplayedPartition::apply(const FramesNews& frames) {
   frames_ = frames.frames;
   settled_ = false;
 }
@@ -161,7 +163,7 @@ void ReplayedPartition::clear(const std::string& id, const WatchedValue& value, 
   (void)node_.clear_history(id);
 }
 
-Result<void> ReplayedPartition::take(const ValuesNews& values) {
+Result<void> ReplayedPartition::apply(const ValuesNews& values) {
   settle(values);
   for (const WatchedValue& value : values.values) {
     if (value.frame >= frames_.size()) continue;
@@ -182,7 +184,7 @@ Result<void> ReplayedPartition::take(const ValuesNews& values) {
       clear(frame.id, value, edge);
       continue;
     }
-    // What it was opened with is that of no instant either; later it has no value at all.
+    // The value that the edge was opened with is that of no instant, either; later it has none.
     if (value.unsampled) {
       if (edge.dynamic) clear(frame.id, value, edge);
       continue;

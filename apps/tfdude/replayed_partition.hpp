@@ -22,11 +22,11 @@ class ReplayedPartition {
                                                       const Options& options);
 
   /// New frames and parents are served together with the values that follow, or after settle().
-  void take(const FramesNews& frames);
+  void apply(const FramesNews& frames);
   /// @return kPartitionTaken: another process serves the partition now
-  [[nodiscard]] Result<void> take(const ValuesNews& values);
-  /// Serves the frames that were taken last. Those that cannot be served yet, because their parent
-  /// is missing, are tried again by the next call.
+  [[nodiscard]] Result<void> apply(const ValuesNews& values);
+  /// Serves the frames that were applied last. Those that cannot be served yet, because their
+  /// parent is missing, are tried again by the next call.
   void settle() { settle({}); }
   [[nodiscard]] bool settled() const { return settled_; }
   /// The joints as they are now in the recording.
@@ -51,7 +51,7 @@ class ReplayedPartition {
   [[nodiscard]] Result<void> flush();
 
   Node node_;
-  std::vector<WatchedFrame> frames_;  // as they were taken last
+  std::vector<WatchedFrame> frames_;  // as they were applied last
   std::unordered_map<std::string, Edge> served_;
   bool settled_ = true;
   std::size_t rejected_ = 0;

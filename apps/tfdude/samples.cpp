@@ -65,13 +65,6 @@ Result<void> check_keys(const Json& object, std::initializer_list<const char*> k
   return {};
 }
 
-Result<EdgeUpdate> finish_edge(const std::string& id, TransformSpec spec, const AngleUnit& angles) {
-  to_radians(spec, angles);
-  auto X_PC = spec.build();
-  if (!X_PC) return fail_at("edge " + quote(id), X_PC.error());
-  return EdgeUpdate{id, *X_PC};
-}
-
 Result<EdgeUpdate> read_edge(const Json& object, const AngleUnit& angles) {
   if (!object.is_object() || !object.contains("edge") || !object["edge"].is_string()) {
     return wrong("an edge needs its frame: \"edge\": ID");
@@ -94,7 +87,9 @@ Result<EdgeUpdate> read_edge(const Json& object, const AngleUnit& angles) {
     spec.covariance = object["covariance"].get<std::string>();
   }
   if (!spec.xyz && !spec.gives_rotation()) return wrong("edge " + quote(id) + " has no pose");
-  return finish_edge(id, std::move(spec), angles);
+  auto X_PC = in_radians(std::move(spec), angles).build();
+  if (!X_PC) return fail_at("edge " + quote(id), X_PC.error());
+  return EdgeUpdate{id, *X_PC};
 }
 
 std::vector<std::string> split(const std::string& line) {
@@ -112,25 +107,33 @@ std::vector<std::string> split(const std::string& line) {
   return cells;
 }
 
-// The place in a pose that a column of CSV fills; null if it is none of a pose.
-double* place_of(const std::string& column, TransformSpec& spec) {
-  const auto in = [&](auto& field, std::initializer_list<const char*> names) -> double* {
-    const auto found = std::find(names.begin(), names.end(), column);
-    if (found == names.end()) return nullptr;
-    if (!field) field.emplace();
-    return &(*field)[static_cast<std::size_t>(found - names.begin())];
-  };
-  for (double* place : {in(spec.xyz, {"x", "y", "z"}), in(spec.rpy, {"roll", "pitch", "yaw"}),
-                        in(spec.quat, {"qx", "qy", "qz", "qw"}),
-                        in(spec.stddev, {"sx", "sy", "sz", "srx", "sry", "srz"})}) {
-    if (place != nullptr) return place;
+// The columns of CSV that are an array in JSON.
+struct Group {
+  const char* key;
+  std::vector<std::string> columns;
+};
+const std::vector<Group>& groups() {
+  static const std::vector<Group> all = {{"xyz", {"x", "y", "z"}},
+                                         {"rpy", {"roll", "pitch", "yaw"}},
+                                         {"quat", {"qx", "qy", "qz", "qw"}},
+                                         {"stddev", {"sx", "sy", "sz", "srx", "sry", "srz"}}};
+  return all;
+}
+
+// Adds a number of a column to an edge in JSON. @return false: no group has the column
+bool add_number(Json& edge, const std::string& column, double number) {
+  for (const Group& group : groups()) {
+    const auto found = std::find(group.columns.begin(), group.columns.end(), column);
+    if (found == group.columns.end()) continue;
+    edge[group.key][static_cast<std::size_t>(found - group.columns.begin())] = number;
+    return true;
   }
-  return nullptr;
+  return false;
 }
 
 // All columns of a group are needed, since a value cannot be partial.
 Result<void> check_columns(const std::vector<std::string>& columns) {
-  const auto has = [&](const char* name) {
+  const auto has = [&](const std::string& name) {
     return std::find(columns.begin(), columns.end(), name) != columns.end();
   };
   for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -140,25 +143,20 @@ Result<void> check_columns(const std::vector<std::string>& columns) {
     }
   }
   if (!has("edge")) return {};
-  TransformSpec spec;
+  Json edge;
   for (const std::string& column : columns) {
     const bool known = column == "edge" || column == "stamp" || column == "stamp_ns" ||
-                       place_of(column, spec) != nullptr;
+                       add_number(edge, column, 0);
     if (!known) return wrong("column " + quote(column) + " is not known beside \"edge\"");
   }
-  const std::initializer_list<std::initializer_list<const char*>> groups = {
-      {"x", "y", "z"},
-      {"roll", "pitch", "yaw"},
-      {"qx", "qy", "qz", "qw"},
-      {"sx", "sy", "sz", "srx", "sry", "srz"}};
-  for (const auto& group : groups) {
-    const auto there = std::count_if(group.begin(), group.end(), has);
-    if (there != 0 && there != static_cast<std::ptrdiff_t>(group.size())) {
-      return wrong(std::string("of the columns ") + *group.begin() + " to " + *(group.end() - 1) +
+  for (const Group& group : groups()) {
+    const auto there = std::count_if(group.columns.begin(), group.columns.end(), has);
+    if (there != 0 && there != static_cast<std::ptrdiff_t>(group.columns.size())) {
+      return wrong("of the columns " + group.columns.front() + " to " + group.columns.back() +
                    " some are missing");
     }
   }
-  if (!spec.xyz && !spec.gives_rotation()) return wrong("no column of a pose beside \"edge\"");
+  if (!has("x") && !has("roll") && !has("qx")) return wrong("no column of a pose beside \"edge\"");
   return {};
 }
 
@@ -173,8 +171,7 @@ Result<double> SampleReader::position(const std::string& joint, double typed) co
   return known->second.type == JointType::kPrismatic ? typed : typed / angles_.per_radian;
 }
 
-Result<Sample> SampleReader::read_json(const std::string& line) const {
-  const Json object = Json::parse(line, nullptr, false);
+Result<Sample> SampleReader::read_object(const Json& object) const {
   if (!object.is_object()) return wrong("not an object of JSON");
   Sample sample;
   const auto stamp = stamp_of(object);
@@ -214,48 +211,33 @@ Result<Sample> SampleReader::read_json(const std::string& line) const {
   return sample;
 }
 
-Result<Sample> SampleReader::read_row(const std::string& line) const {
+Result<void> SampleReader::read_row(const std::string& line, Json& object) const {
   const std::vector<std::string> cells = split(line);
   if (cells.size() != columns_.size()) {
     return wrong(std::to_string(cells.size()) + " values for " + std::to_string(columns_.size()) +
                  " columns");
   }
-  Sample sample;
-  std::string edge;
-  TransformSpec spec;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string& column = columns_[i];
+    const std::string& text = cells[i];
     if (column == "edge") {
-      edge = cells[i];
+      object["edge"] = text;
       continue;
     }
-    if (!is_number(cells[i])) return wrong(column + ": " + quote(cells[i]) + " is not a number");
-    const double value = std::strtod(cells[i].c_str(), nullptr);
-    if (column == "stamp_ns") {
-      if (cells[i].find_first_not_of("0123456789") != std::string::npos || value > 9.2e18) {
-        return wrong("stamp_ns is not a whole number of nanoseconds");
-      }
-      sample.stamp = time_of(std::strtoll(cells[i].c_str(), nullptr, 10));
-    } else if (column == "stamp") {
-      const auto stamp = stamp_of(value);
-      if (!stamp) return tl::unexpected(stamp.error());
-      sample.stamp = *stamp;
-    } else if (edges_) {
-      *place_of(column, spec) = value;
+    if (!is_number(text)) return wrong(column + ": " + quote(text) + " is not a number");
+    const double number = std::strtod(text.c_str(), nullptr);
+    const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+    if (column == "stamp_ns" && digits) {
+      object[column] = std::strtoull(text.c_str(), nullptr, 10);
+    } else if (column == "stamp" || column == "stamp_ns") {
+      object[column] = number;
+    } else if (!edges_) {
+      object["joints"][column] = number;
     } else {
-      const auto at = position(column, value);
-      if (!at) return tl::unexpected(at.error());
-      sample.joints.push_back({column, *at});
+      (void)add_number(object, column, number);
     }
   }
-  if (!edges_) {
-    if (sample.joints.empty()) return wrong("neither an edge nor a joint");
-    return sample;
-  }
-  auto update = finish_edge(edge, std::move(spec), angles_);
-  if (!update) return tl::unexpected(update.error());
-  sample.edges.push_back(*std::move(update));
-  return sample;
+  return {};
 }
 
 Result<std::optional<Sample>> SampleReader::read(const std::string& line) {
@@ -270,7 +252,13 @@ Result<std::optional<Sample>> SampleReader::read(const std::string& line) {
     return std::nullopt;
   }
   if (form_ == Form::kUndecided) form_ = Form::kJson;
-  const auto sample = form_ == Form::kJson ? read_json(line) : read_row(line);
+  Json object = Json::object();
+  if (form_ == Form::kJson) {
+    object = Json::parse(line, nullptr, false);
+  } else if (auto ok = read_row(line, object); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  const auto sample = read_object(object);
   if (!sample) return tl::unexpected(sample.error());
   return *sample;
 }

@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/joint_spec.hpp"
 
-#include "angles.hpp"
+#include "../rendering/angles.hpp"
 
 // Samples of edges and joints as lines of text.
 namespace tfdude::cli {
@@ -41,8 +43,9 @@ class SampleReader {
  private:
   enum class Form { kUndecided, kJson, kCsv };
 
-  [[nodiscard]] Result<Sample> read_json(const std::string& line) const;
-  [[nodiscard]] Result<Sample> read_row(const std::string& line) const;
+  [[nodiscard]] Result<Sample> read_object(const nlohmann::json& object) const;
+  /// Adds what a line of CSV says, as an object of JSON says it.
+  [[nodiscard]] Result<void> read_row(const std::string& line, nlohmann::json& object) const;
 
   AngleUnit angles_;
   std::map<std::string, JointInfo> joints_;

@@ -10,7 +10,7 @@
 
 namespace tfdude::cli {
 
-/// Who answers a command: the live system, or a recording at the instant that it shows. A
+/// The live system, or a recording at the instant that it shows: what answers a command. A
 /// reference to either of them.
 class Source {
  public:

@@ -8,9 +8,8 @@
 
 #include "tfdude/types/version.hpp"
 
-#include "../manual.hpp"
+#include "../command_line.hpp"
 #include "../network_options.hpp"
-#include "../numbers.hpp"
 
 namespace tfdude::daemon {
 namespace {
@@ -153,26 +152,23 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_option("--max-history", limits.history_bytes, "memory of all histories [bytes]")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMost));
-  cli::require_numbers(app);
-  cli::add_manual(
-      app, {{"FILES",
-             "The service tfduded@PARTITION of systemd reads /etc/tfdude/PARTITION.yaml and the "
-             "variables in /etc/default/tfdude, and keeps its state in /var/lib/tfdude/PARTITION. "
-             "The target tfdude.target stands for all of these services."}});
-  try {
-    app.name(argv[0]);
-    app.parse(cli::arguments_of(argc, argv));
-    arguments.urdfs = urdfs.parts();
-    set_configs(configs, arguments);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kWrongUsage;
-  }
+  const auto status = cli::read_command_line(
+      app, argc, argv,
+      {{"FILES",
+        "The service tfduded@PARTITION of systemd reads /etc/tfdude/PARTITION.yaml and the "
+        "variables in /etc/default/tfdude, and keeps its state in /var/lib/tfdude/PARTITION. "
+        "The target tfdude.target stands for all of these services."}},
+      [&] {
+        arguments.urdfs = urdfs.parts();
+        set_configs(configs, arguments);
+      });
+  if (status) return status;
   arguments.options.save_every = Milliseconds(save_every_ms);
   if (!arguments.options.state.empty() || no_state) return std::nullopt;
   arguments.options.state = default_state();
   if (!arguments.options.state.empty()) return std::nullopt;
   std::fputs("tfduded: no home directory: give --state DIR or --no-state\n", stderr);
-  return kWrongUsage;
+  return cli::kWrongUsage;
 }
 
 }  // namespace tfdude::daemon

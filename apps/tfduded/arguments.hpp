@@ -9,8 +9,6 @@
 
 namespace tfdude::daemon {
 
-inline constexpr int kWrongUsage = 2;
-
 /// The daemon's command line.
 struct Arguments {
   std::string partition;

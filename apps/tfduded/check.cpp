@@ -116,7 +116,7 @@ int check(const Arguments& arguments, const Config& config) {
   const auto preview = preview_config(config.partition, config.frames, options);
   if (!preview) {
     spdlog::error("partition {}: {}", quote(config.partition), preview.error().message);
-    return kWrongUsage;
+    return cli::kWrongUsage;
   }
   std::printf("would serve partition %s in domain %u with %s: %s\n",
               quote(config.partition).c_str(), options.domain, profile_of(options).c_str(),
@@ -126,9 +126,9 @@ int check(const Arguments& arguments, const Config& config) {
   print_needs(preview->served);
   if (auto ok = check_keys(options.keys, config.partition, options.domain); !ok) {
     spdlog::error("{}", ok.error().message);
-    return kWrongUsage;
+    return cli::kWrongUsage;
   }
-  return std::fflush(stdout) == 0 ? 0 : cli::kRefused;
+  return std::fflush(stdout) == 0 ? 0 : cli::kRejected;
 }
 
 }  // namespace tfdude::daemon

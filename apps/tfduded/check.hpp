@@ -11,7 +11,7 @@ namespace tfdude::daemon {
 
 /// Prints what the daemon would serve, and what the configuration would change in the stored state.
 /// Checks the keys, too. Joins no domain, and writes no file.
-/// @return the exit status: 0, or kWrongUsage if the daemon would not start
+/// @return the exit status: 0, or cli::kWrongUsage if the daemon would not start
 [[nodiscard]] int check(const Arguments& arguments, const Config& config);
 
 /// What is wrong with the configurations of a robot's daemons if they run together: a partition, a

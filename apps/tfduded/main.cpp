@@ -21,9 +21,9 @@
 
 namespace {
 
-using tfdude::cli::kRefused;
+using tfdude::cli::kRejected;
+using tfdude::cli::kWrongUsage;
 using tfdude::daemon::Arguments;
-using tfdude::daemon::kWrongUsage;
 
 tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
   tfdude::Config config;
@@ -95,7 +95,7 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
     const auto code = node.error().code;
-    return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRefused;
+    return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRejected;
   }
   std::printf("ready partition=%s frames=%zu\n", config->partition.c_str(), node->own_frames());
   std::fflush(stdout);

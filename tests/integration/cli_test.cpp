@@ -43,10 +43,10 @@ json object(const ThesisDaemons& d, Arguments arguments) {
 // As the help lists them.
 std::vector<std::string> commands_of(const std::string& help) {
   std::vector<std::string> commands;
-  std::istringstream lines(help.substr(help.find("Subcommands:\n")));
-  std::string line;
-  std::getline(lines, line);
-  while (std::getline(lines, line) && line.rfind("  ", 0) == 0) {
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    // Options begin with a hyphen.
+    if (line.rfind("  ", 0) != 0 || line[2] < 'a' || line[2] > 'z') continue;
     commands.push_back(line.substr(2, line.find(' ', 2) - 2));
   }
   return commands;

@@ -17,8 +17,8 @@ def run(*command: str) -> "subprocess.CompletedProcess[str]":
 
 
 def commands_of(help_text: str) -> "list[str]":
-    listed = re.search(r"(?s)^Subcommands:\n(.*?)(?:\n\n|\Z)", help_text, re.MULTILINE)
-    return re.findall(r"(?m)^  (\S+)", listed.group(1)) if listed else []
+    """They stand below the headings of their groups; options begin with a hyphen, arguments with a capital."""
+    return re.findall(r"(?m)^  ([a-z]\S*)", help_text)
 
 
 def check(program: pathlib.Path, words: "list[str]", pages: pathlib.Path) -> "list[str]":

@@ -4,13 +4,15 @@
 
 #include "tfdude/client/client.hpp"
 
-#include "../commands.hpp"
+#include "../../rendering/table.hpp"
+#include "../answer.hpp"
+#include "../stamps.hpp"
 #include "host_facts.hpp"
 
 namespace tfdude::cli {
 namespace {
 
-// Long enough to meet whoever is on this host.
+// Long enough to discover all participants of this host.
 constexpr Milliseconds kMoment{400};
 // Of the domains that this host has participants of.
 constexpr std::size_t kMostDomains = 5;
@@ -26,8 +28,8 @@ std::vector<UdpSocket> sockets_of(bool own) {
   return sockets;
 }
 
-// Whoever a participant with these options meets within a moment.
-std::vector<PartitionInfo> met_by(Options options) {
+// The partitions that a participant with these options discovers within a moment.
+std::vector<PartitionInfo> discovered_by(Options options) {
   options.timeout = options.discovery = kMoment;
   auto client = Client::open(options);
   if (!client) return {};
@@ -35,7 +37,7 @@ std::vector<PartitionInfo> met_by(Options options) {
 }
 
 // While a participant exists: a profile of a file may be of either kind.
-void look_at_own(Facts& facts) {
+void read_own_sockets(Facts& facts) {
   const Listeners own = listeners_in(sockets_of(true), facts.domain);
   if (own.any()) facts.loopback = own.everywhere == 0;
 }
@@ -56,12 +58,12 @@ void ask_domain(Client& client, Facts& facts) {
   }
 }
 
-void look_elsewhere(const Options& options, Facts& facts) {
+void search_elsewhere(const Options& options, Facts& facts) {
   const Listeners others = facts.others_here();
   if ((facts.loopback ? others.everywhere : others.loopback) > 0) {
     Options other = options;
     other.profile = facts.loopback ? "" : kLocalProfile;
-    facts.of_other_profile = met_by(other);
+    facts.of_other_profile = discovered_by(other);
   }
   if (!facts.met.empty()) return;
   for (const auto& [domain, listeners] : facts.others) {
@@ -71,9 +73,7 @@ void look_elsewhere(const Options& options, Facts& facts) {
     if (options.profile.empty() || options.profile == kLocalProfile) {
       other.profile = listeners.everywhere > 0 ? "" : kLocalProfile;
     }
-    std::vector<std::string> names;
-    for (const PartitionInfo& partition : met_by(other)) names.push_back(partition.name);
-    facts.elsewhere.emplace(domain, std::move(names));
+    facts.elsewhere.emplace(domain, names_of(discovered_by(other), &PartitionInfo::name));
   }
 }
 
@@ -92,16 +92,16 @@ Facts gather_facts(const Options& options) {
   if (!options.keys.empty()) facts.keys = find_keys(options.keys, facts.now);
   facts.others = listeners_of(sockets_of(false));
   if (auto client = Client::open(options)) {
-    look_at_own(facts);
+    read_own_sockets(facts);
     ask_domain(*client, facts);
   } else {
     facts.failed = client.error();
     // Perhaps because of its keys.
     Options plain = options;
     plain.keys.clear();
-    if (client = Client::open(plain); client) look_at_own(facts);
+    if (client = Client::open(plain); client) read_own_sockets(facts);
   }
-  look_elsewhere(options, facts);
+  search_elsewhere(options, facts);
   facts.interfaces = read_interfaces(facts.loopback);
   facts.receive_buffer = granted_receive_buffer(kReceiveBuffer);
   facts.send_buffer = granted_send_buffer(kSendBuffer);

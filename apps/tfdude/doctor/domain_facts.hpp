@@ -4,11 +4,11 @@
 
 #include "facts.hpp"
 
-// What the domain tells, and whoever else is on this host.
+// Facts about the domain, and about other participants of this host.
 namespace tfdude::cli {
 
 /// Finds out all facts. Joins the domain for as long as a command does, and others of this host for
-/// a moment if nobody was met.
+/// a moment if no partition was discovered.
 [[nodiscard]] Facts gather_facts(const Options& options);
 
 }  // namespace tfdude::cli

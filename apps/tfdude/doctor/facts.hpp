@@ -39,7 +39,7 @@ struct Listeners {
   [[nodiscard]] bool any() const { return everywhere + loopback > 0; }
 };
 
-/// A partition that was met, and the clock of its host.
+/// A partition that was discovered, and the clock of its host.
 struct Met {
   PartitionInfo partition;
   std::optional<ClockDifference> clock{};  ///< absent: it did not answer
@@ -63,10 +63,11 @@ struct Facts {
   // The domain.
   std::vector<Met> met{};
   std::optional<Error> failed{};  ///< why the partitions could not be asked for
-  /// Those met by a participant with the other of the two built-in profiles, if somebody uses it.
+  /// Those that a participant with the other of the two built-in profiles discovers, if that is in
+  /// use here.
   std::vector<PartitionInfo> of_other_profile{};
-  /// The names of partitions in other domains that this host has participants of, if nobody was
-  /// met.
+  /// The names of partitions in other domains that this host has participants of, if none was
+  /// discovered in this one.
   std::map<std::uint32_t, std::vector<std::string>> elsewhere{};
 
   std::optional<Result<KeyFiles>> keys{};  ///< absent: none are used
@@ -86,7 +87,7 @@ struct Finding {
   std::string remedy;
 };
 
-/// Judges the facts. The most likely reason why nobody is met comes first.
+/// Judges the facts. The most likely reason why no partition answers comes first.
 [[nodiscard]] std::vector<Finding> findings_of(const Facts& facts);
 
 /// What could not be checked, and how it could: one sentence each.

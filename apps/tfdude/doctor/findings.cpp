@@ -4,7 +4,9 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "../format.hpp"
+#include "../../rendering/format.hpp"
+#include "../../rendering/table.hpp"
+#include "../../rendering/text.hpp"
 #include "facts.hpp"
 
 // Each function judges one kind of facts, and adds what it finds.
@@ -13,16 +15,9 @@ namespace {
 
 using Findings = std::vector<Finding>;
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + quote(name);
-  return text;
-}
-
-std::vector<std::string> names_of(const std::vector<PartitionInfo>& partitions) {
-  std::vector<std::string> names;
-  for (const PartitionInfo& partition : partitions) names.push_back(partition.name);
-  return names;
+std::string quoted(std::vector<std::string> names) {
+  for (std::string& name : names) name = quote(name);
+  return joined(names);
 }
 
 std::string process_of(const PartitionInfo& partition) {
@@ -69,7 +64,8 @@ void judge_profile(const Facts& facts, Findings& findings) {
   if (!known && (other == 0 || !facts.met.empty())) return;
   std::string who = std::to_string(other) + " participants of this host in domain " +
                     std::to_string(facts.domain);
-  if (known) who += " (partitions " + joined(names_of(facts.of_other_profile)) + ")";
+  if (known)
+    who += " (partitions " + quoted(names_of(facts.of_other_profile, &PartitionInfo::name)) + ")";
   findings.push_back(
       {"profile",
        who + (facts.loopback ? " use all network interfaces, and this program 127.0.0.1 only"
@@ -84,7 +80,7 @@ void judge_domains(const Facts& facts, Findings& findings) {
     if (partitions.empty()) continue;
     findings.push_back(
         {"domain",
-         "this host has partitions in domain " + std::to_string(domain) + ": " + joined(partitions),
+         "this host has partitions in domain " + std::to_string(domain) + ": " + quoted(partitions),
          "if they are meant: --domain " + std::to_string(domain) +
              ", or TFDUDE_DOMAIN=" + std::to_string(domain)});
   }

@@ -25,8 +25,8 @@ std::vector<Ports> udp_ports(const std::string& rule) {
       continue;
     }
     char* end = nullptr;
-    const auto number = [&end](const char* at) {
-      return static_cast<std::uint32_t>(std::strtoul(at, &end, 10));
+    const auto number = [&end](const char* digits) {
+      return static_cast<std::uint32_t>(std::strtoul(digits, &end, 10));
     };
     const std::uint32_t first = number(text.c_str() + i);
     const std::uint32_t last = *end == '-' ? number(end + 1) : first;

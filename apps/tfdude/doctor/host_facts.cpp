@@ -50,7 +50,7 @@ std::optional<bool> multicast_returns(const in_addr& interface) {
   if (!receiver.set(IPPROTO_IP, IP_ADD_MEMBERSHIP, group)) return std::nullopt;
   if (!sender.set(IPPROTO_IP, IP_MULTICAST_IF, interface)) return std::nullopt;
   const std::string text = "tfdude doctor " + std::to_string(getpid());
-  // A firewall may refuse the message at once: then it does not come back, either.
+  // A firewall may reject the message at once: then it does not come back, either.
   if (sendto(sender.get(), text.data(), text.size(), 0, address, size) < 0) {
     return errno == EPERM ? std::optional(false) : std::nullopt;
   }

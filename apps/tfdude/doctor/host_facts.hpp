@@ -2,7 +2,7 @@
 
 #include "facts.hpp"
 
-// What this host tells about itself.
+// Facts about this host.
 namespace tfdude::cli {
 
 /// The interfaces; those that a participant uses are tried with a multicast message.
@@ -15,7 +15,7 @@ namespace tfdude::cli {
 [[nodiscard]] std::vector<std::uint64_t> own_sockets();
 
 /// Why nobody can listen at the address of a discovery server (HOST:PORT): its host has no address,
-/// or refuses messages to the port. Empty: somebody may listen.
+/// or rejects messages to the port. Empty: somebody may listen.
 [[nodiscard]] std::string fault_of_server(const std::string& server);
 
 /// How much of a requested buffer a UDP socket gets [bytes].

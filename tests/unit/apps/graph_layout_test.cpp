@@ -1,6 +1,6 @@
 // Which frames the picture of a forest shows, and how they are put together.
 
-#include "tfdude/graph_layout.hpp"
+#include "tfdude/drawing/graph_layout.hpp"
 
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "tfdude/graph.hpp"
+#include "tfdude/drawing/graph.hpp"
 
 #include <algorithm>
 #include <regex>

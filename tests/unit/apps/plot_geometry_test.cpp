@@ -1,4 +1,4 @@
-#include "tfdude/plot_geometry.hpp"
+#include "tfdude/drawing/plot_geometry.hpp"
 
 #include <cmath>
 #include <string>

@@ -1,4 +1,4 @@
-#include "tfdude/plot.hpp"
+#include "tfdude/drawing/plot.hpp"
 
 #include <algorithm>
 #include <array>

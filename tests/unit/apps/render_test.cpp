@@ -1,13 +1,14 @@
-#include "tfdude/render.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "tfdude/uncertainty_render.hpp"
+#include "tfdude/commands/tree.hpp"
+#include "tfdude/commands/velocity.hpp"
 
+#include "rendering/json.hpp"
+#include "rendering/text.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude::cli {
@@ -106,7 +107,7 @@ TEST_CASE("what is typed in degrees is converted where it is an angle") {
   spec.rpy = {0, 90, -180};
   spec.stddev = {1, 2, 3, 180, 90, 0};
   spec.cov = Covariance::trusted(Matrix6d(Matrix6d::Ones())).upper();
-  to_radians(spec, kDegree);
+  spec = in_radians(spec, kDegree);
   const double pi = std::acos(-1.0);
   CHECK((*spec.rpy)[1] == Approx(pi / 2));
   CHECK((*spec.stddev)[2] == 3);
@@ -116,7 +117,7 @@ TEST_CASE("what is typed in degrees is converted where it is an angle") {
   CHECK((*spec.cov)[upper_index(3, 5)] == Approx(pi * pi / 180 / 180));
   TransformSpec radians;
   radians.rpy = {1, 2, 3};
-  to_radians(radians, kRadian);
+  radians = in_radians(radians, kRadian);
   CHECK((*radians.rpy)[2] == 3);
 }
 

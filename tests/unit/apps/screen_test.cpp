@@ -1,4 +1,4 @@
-#include "tfdude/screen.hpp"
+#include "rendering/screen.hpp"
 
 #include "support/catch.hpp"
 

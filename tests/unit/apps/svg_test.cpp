@@ -1,4 +1,4 @@
-#include "tfdude/svg.hpp"
+#include "tfdude/drawing/svg.hpp"
 
 #include <algorithm>
 #include <cmath>

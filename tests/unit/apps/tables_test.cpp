@@ -5,13 +5,17 @@
 #include <sstream>
 #include <string>
 
-#include "tfdude/format.hpp"
-#include "tfdude/joint_render.hpp"
-#include "tfdude/render.hpp"
-#include "tfdude/table.hpp"
-#include "tfdude/time_render.hpp"
-#include "tfdude/uncertainty_render.hpp"
+#include "tfdude/commands/echo.hpp"
+#include "tfdude/commands/history.hpp"
+#include "tfdude/commands/joint.hpp"
+#include "tfdude/commands/joints.hpp"
+#include "tfdude/commands/monitor.hpp"
+#include "tfdude/commands/partitions.hpp"
 
+#include "rendering/format.hpp"
+#include "rendering/json.hpp"
+#include "rendering/table.hpp"
+#include "rendering/text.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude::cli {

@@ -1,16 +1,16 @@
 // Colours, and texts that have them.
 
-#include "tfdude/terminal.hpp"
+#include "rendering/terminal.hpp"
 
 #include <cstdlib>
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "tfdude/joint_render.hpp"
-#include "tfdude/screen.hpp"
-#include "tfdude/table.hpp"
+#include "tfdude/commands/joints.hpp"
 
+#include "rendering/screen.hpp"
+#include "rendering/table.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude::cli {

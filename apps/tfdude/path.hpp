@@ -1,0 +1,46 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "command.hpp"
+
+// Paths: from frame A to frame B.
+namespace tfdude::cli {
+
+/// The ends of a path, and how transforms along it are printed.
+struct Path {
+  /// Adds A and B.
+  void add_ends(CLI::App& app);
+  /// Adds --cov and --matrix.
+  void add_printing(CLI::App& app);
+
+  [[nodiscard]] nlohmann::json json(Source source, const StampedTransform& X_AB) const;
+  /// Pose, deviations and stamp.
+  [[nodiscard]] std::string text(Source source, const Common& common,
+                                 const StampedTransform& X_AB) const;
+  /// Prints one of both. @param more  for the end of the text. @return the exit status
+  int print(Source source, const Common& common, const StampedTransform& X_AB,
+            const std::string& more = "") const;
+
+  std::string a;
+  std::string b;
+  bool covariance = false;  ///< print the full one
+  bool matrix = false;      ///< print the pose as a matrix
+};
+
+/// Adds --cov alone.
+void add_covariance_flag(CLI::App& app, bool& covariance);
+/// Adds --rate and --composed of a path that is followed.
+void add_watch_options(CLI::App& app, WatchOptions& options);
+
+/// Calls show() with the path's newest transform at the rate of the options, until interrupted. If
+/// the path cannot be watched, or an owner is unreachable, reports that instead, each reason once.
+/// @return the exit status
+int follow(Client& client, const Common& common, const Path& path, const WatchOptions& options,
+           const std::function<void(const StampedTransform&)>& show);
+
+}  // namespace tfdude::cli
