@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/mutex.hpp"
+#include "base/thread_name.hpp"
 #include "runtime/discovery.hpp"
 
 namespace tfdude {
@@ -41,8 +42,13 @@ bool is_worth_waiting(const Error& error, const Query& query) {
   }
 }
 
-PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links)
-    : forest_(forest), calls_(calls), hints_(hints), links_(std::move(links)) {}
+PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints,
+                               Callbacks& callbacks, Links links)
+    : forest_(forest),
+      calls_(calls),
+      hints_(hints),
+      links_(std::move(links)),
+      callbacks_(callbacks) {}
 
 void PendingLookups::stop() {
   {
@@ -58,12 +64,11 @@ void PendingLookups::stop() {
   }
   // Here, since objects held by callbacks are destroyed with them.
   for (const auto& lookup : left) give_up(*lookup);
-  callbacks_.stop();
 }
 
 void PendingLookups::give_up(Lookup& lookup) {
   if (lookup.callback != nullptr) {
-    lookup.callback->cancel();
+    lookup.callback->close();
   } else {
     lookup.promise.set_value(
         fail(Errc::kTimeout,
@@ -79,10 +84,12 @@ std::future<PendingLookups::Found> PendingLookups::add(Wanted wanted, const Dead
   return future;
 }
 
-std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
-    Wanted wanted, const Deadline& deadline, Error last, OneCall<Found>::Function callback) {
+std::shared_ptr<Callbacks::Line> PendingLookups::add(Wanted wanted, const Deadline& deadline,
+                                                     Error last, Callback callback) {
   auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
-  auto call = lookup->callback = std::make_shared<OneCall<Found>>(std::move(callback));
+  auto found = lookup->found = std::make_shared<Found>();
+  auto call = lookup->callback = callbacks_.line();
+  call->prepare([found, callback = std::move(callback)] { callback(std::move(*found)); });
   add(std::move(lookup));
   return call;
 }
@@ -120,6 +127,7 @@ std::uint64_t PendingLookups::version() const {
 }
 
 void PendingLookups::run() {
+  name_this_thread("tfdude-lookup");
   All all;
   bool listens = false;
   Lock lock(mutex_);
@@ -160,13 +168,12 @@ PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written)
     return false;
   };
   all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
-  if (const auto look = callbacks_.look_after(Clock::now())) next = std::min(next, *look);
   return next;
 }
 
 /// Each of the following returns true if the lookup is finished.
 bool PendingLookups::attend(Lookup& lookup, bool written) {
-  if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
+  if (lookup.callback != nullptr && lookup.callback->closed()) return true;
   if (lookup.asking) return go_on_asking(lookup);
   if (written && lookup.far) hurry(lookup);
   const auto now = Clock::now();
@@ -269,10 +276,8 @@ void PendingLookups::finish(Lookup& lookup, Found found) {
     lookup.promise.set_value(std::move(found));
     return;
   }
-  // If the job is dropped instead, objects held by its function are destroyed, too.
-  const std::shared_ptr<OneCall<Found>> call(lookup.callback.get(),
-                                             [owner = lookup.callback](auto*) { owner->cancel(); });
-  callbacks_.post([call, found = std::move(found)]() mutable { call->run(std::move(found)); });
+  *lookup.found = std::move(found);
+  lookup.callback->go();
 }
 
 }  // namespace tfdude

@@ -16,7 +16,6 @@
 #include "runtime/callbacks.hpp"
 #include "runtime/deadline.hpp"
 #include "runtime/gathering.hpp"
-#include "runtime/one_call.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude {
@@ -62,19 +61,20 @@ class PendingLookups {
     bool plan_asks = false;
   };
 
-  PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links);
+  PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Callbacks& callbacks,
+                 Links links);
   ~PendingLookups() { stop(); }
   PendingLookups(const PendingLookups&) = delete;
   PendingLookups& operator=(const PendingLookups&) = delete;
 
-  /// Waiting lookups get kTimeout; their callbacks are not called. After it has returned no
-  /// callback runs, except one that calls this.
+  /// Waiting lookups get kTimeout; their callbacks are not called.
   void stop();
 
   /// @param last  why there was no answer so far
   [[nodiscard]] std::future<Found> add(Wanted wanted, const Deadline& deadline, Error last);
-  [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
-                                                    Error last, OneCall<Found>::Function callback);
+  /// @return what calls the callback; closing it cancels the lookup
+  [[nodiscard]] std::shared_ptr<Callbacks::Line> add(Wanted wanted, const Deadline& deadline,
+                                                     Error last, Callback callback);
 
   /// What plan() would find has changed.
   void look_again();
@@ -92,7 +92,8 @@ class PendingLookups {
     Error last;
     // One of the two gets the answer.
     std::promise<Found> promise;
-    std::shared_ptr<OneCall<Found>> callback;
+    std::shared_ptr<Callbacks::Line> callback;  // prepared to be called
+    std::shared_ptr<Found> found;               // with this
 
     // The following belong to the thread.
     const Clock::time_point began = Clock::now();
@@ -125,7 +126,7 @@ class PendingLookups {
   Calls& calls_;
   SharedHints& hints_;
   const Links links_;
-  Callbacks callbacks_;
+  Callbacks& callbacks_;
   std::size_t count_ = 0;                 // number of waiting lookups; belongs to the thread
   std::atomic<std::uint64_t> routes_{0};  // how often what plan() would find has changed
   std::atomic<bool> written_{false};      // new data may have arrived

@@ -30,7 +30,7 @@ class Watch : public std::enable_shared_from_this<Watch> {
   [[nodiscard]] Result<StampedTransform> read() const { return path_.lookup({}); }
 
   /// The groups whose values it needs.
-  [[nodiscard]] std::set<std::uint64_t> groups() const { return path_.groups(); }
+  [[nodiscard]] std::set<std::uint64_t> groups() { return path_.groups({}); }
 
   // ---- input from the process
   void on_reply(const Reply& reply);
