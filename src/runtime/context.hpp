@@ -13,12 +13,13 @@ namespace tfdude {
 class MemberRunner;
 class Requests;
 
-/// The threads of a participant on which its parts run things later, besides those of CommitLoop
-/// and PendingLookups. docs/architecture.md lists all threads.
+/// The threads on which the parts of a participant run things later, besides that of CommitLoop.
+/// docs/architecture.md lists all threads.
 struct Threads {
-  Loop prompt{"tfdude-push"};  ///< for jobs that wait for nobody
+  Loop calls{"tfdude-calls"};  ///< for jobs that wait for nobody
+  Loop push{"tfdude-push"};    ///< for pushing to watchers
   Loop asking{"tfdude-ask"};   ///< for jobs that wait for the replies of others
-  Callbacks callbacks{prompt};
+  Callbacks callbacks{calls};
 };
 
 /// What the parts of a participant need of it. All of it outlives them.

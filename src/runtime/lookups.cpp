@@ -23,8 +23,8 @@ Lookups::Lookups(const Context& context, const WatchClient& watches)
       discovery_(context.discovery),
       requests_(context.requests),
       timeout_(context.options.timeout),
-      pending_(context.structure.forest, context.requests.calls(), hints_,
-               context.threads.callbacks, links(context.transport, watches)) {}
+      pending_(context.structure.forest, context.requests.calls(), hints_, context.threads,
+               links(context.transport, watches)) {}
 
 PendingLookups::Links Lookups::links(Transport& transport, const WatchClient& watches) {
   return {[this](const PendingLookups::Wanted& wanted) { return plan(wanted); },

@@ -46,7 +46,7 @@ MemberRunner::MemberRunner(const Context& context, std::string partition, Listen
       member_(context.structure.forest, context.structure.directory, name_),
       events_(std::make_shared<Events>(context.threads.callbacks)),
       gone_looks_(
-          context.threads.prompt,
+          context.threads.calls,
           [this] {
             input([](Member& member) { member.on_time(Clock::now()); });
             return Loop::kNever;

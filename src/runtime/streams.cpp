@@ -38,7 +38,7 @@ Streams::Streams(const Context& context)
     : of_edges_(edge_links(context)),
       of_joints_(joint_links(context)),
       plans_(
-          context.threads.prompt,
+          context.threads.calls,
           [this] {
             for (const auto& one : senders()) one->plan();
             return Loop::kNever;

@@ -17,7 +17,7 @@ class WatchServer final : private PushLoop::Sink {
   WatchServer(const Context& context, WatchClient& watches)
       : context_(context),
         watches_(watches),
-        pushes_(context.threads.prompt, context.structure.forest, context.options.limits.watches,
+        pushes_(context.threads.push, context.structure.forest, context.options.limits.watches,
                 *this) {}
 
   /// Ends pushing; later watch requests are refused.

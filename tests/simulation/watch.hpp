@@ -16,7 +16,7 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// A watched path of a client, maintained in steps as Watches does it.
+/// A watched path of a client, maintained in steps as WatchLoop does it.
 class Watch : public std::enable_shared_from_this<Watch> {
  public:
   /// @param shown  called when its value may have changed
