@@ -34,7 +34,7 @@ void Loop::run() {
   while (!stopping_) {
     auto wake_at = kNever;
     if (Job* due = next_due(Clock::now(), wake_at)) {
-      run(*due, lock);
+      run(*due);
     } else if (wake_at == kNever) {
       changed_.wait(lock);
     } else {
@@ -52,16 +52,16 @@ Loop::Job* Loop::next_due(Clock::time_point now, Clock::time_point& wake_at) {
   return nullptr;
 }
 
-void Loop::run(Job& job, Lock& lock) {
+void Loop::run(Job& job) {
   const auto turn = std::find(jobs_.begin(), jobs_.end(), &job);
   std::rotate(turn, turn + 1, jobs_.end());
   running_ = &job;
   job.due_ = kNever;
-  lock.unlock();
+  mutex_.unlock();
   // Before the run, so that changes during it are not missed.
   job.asked_.store(false);
   const auto again = job.run_();
-  lock.lock();
+  mutex_.lock();
   running_ = nullptr;
   job.due_ = std::min(job.due_, again);
   job.rests_until_ = Clock::now() + job.rest_;

@@ -34,7 +34,7 @@ class Loop {
   void run();
   [[nodiscard]] Job* next_due(Clock::time_point now, Clock::time_point& wake_at)
       TFDUDE_REQUIRES(mutex_);
-  void run(Job& job, Lock& lock) TFDUDE_REQUIRES(mutex_);
+  void run(Job& job) TFDUDE_REQUIRES(mutex_);
 
   const char* const name_;
   Mutex mutex_;
@@ -78,8 +78,9 @@ class Loop::Job {
   const Run run_;
   const std::chrono::nanoseconds rest_;
   std::atomic<bool> asked_{false};
-  Clock::time_point due_ TFDUDE_GUARDED_BY(loop_.mutex_) = kNever;
-  Clock::time_point rests_until_ TFDUDE_GUARDED_BY(loop_.mutex_) = Clock::time_point::min();
+  // Under the loop's lock.
+  Clock::time_point due_ = kNever;
+  Clock::time_point rests_until_ = Clock::time_point::min();
 };
 
 }  // namespace tfdude

@@ -32,7 +32,7 @@ struct Callbacks::State {
   /// Whether lines wait, nobody is there to run them, and nobody looks after them.
   [[nodiscard]] bool must_look() TFDUDE_REQUIRES(mutex);
   /// Runs the first call of the line that is due first. @return whether the thread goes on
-  [[nodiscard]] bool run_first(Lock& lock) TFDUDE_REQUIRES(mutex);
+  [[nodiscard]] bool run_first() TFDUDE_REQUIRES(mutex);
   /// The calls that are dropped, to be destroyed without the lock.
   [[nodiscard]] std::vector<std::deque<Call>> drop() TFDUDE_REQUIRES(mutex);
 
@@ -130,7 +130,7 @@ void Callbacks::State::run(const std::shared_ptr<State>& state) {
     const auto now = Clock::now();
     const auto first = state->due.empty() ? Clock::time_point::max() : state->due.begin()->first;
     if (first <= now) {
-      if (!state->run_first(lock)) return;
+      if (!state->run_first()) return;
     } else if (state->due.empty()) {
       state->changed.wait(lock);
     } else {
@@ -139,7 +139,7 @@ void Callbacks::State::run(const std::shared_ptr<State>& state) {
   }
 }
 
-bool Callbacks::State::run_first(Lock& lock) {
+bool Callbacks::State::run_first() {
   const auto line = std::move(due.begin()->second);
   due.erase(due.begin());
   Line::Waiting& waiting = *line->waiting_;
@@ -152,18 +152,20 @@ bool Callbacks::State::run_first(Lock& lock) {
   moved = Clock::now();
   --idle;
   const bool looks = must_look();
-  lock.unlock();
+  mutex.unlock();
   if (looks) look->ask_by(Clock::now() + kPatience);
   call();
   call = nullptr;  // what it holds is destroyed without the lock, and before its end is reported
-  lock.lock();
+  mutex.lock();
   ++idle;
   waiting.running = false;
   waiting.runner = {};
   ended.notify_all();
   if (stopping) {
-    const auto dropped = std::move(waiting.calls);
-    lock.unlock();
+    auto dropped = std::exchange(waiting.calls, {});
+    mutex.unlock();
+    dropped.clear();
+    mutex.lock();
     return false;
   }
   const auto now = Clock::now();

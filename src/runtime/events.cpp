@@ -23,7 +23,7 @@ struct Waiting {
 struct Events::State {
   /// Reports all changes in the queue.
   void report();
-  void report(const Waiting& one, Lock& lock) TFDUDE_REQUIRES(mutex);
+  void report(const Waiting& one) TFDUDE_REQUIRES(mutex);
   /// The next change to report; empty if there is none.
   [[nodiscard]] std::optional<Waiting> next() TFDUDE_REQUIRES(mutex);
 
@@ -107,23 +107,23 @@ std::optional<Waiting> Events::State::next() {
 }
 
 void Events::State::report() {
-  Lock lock(mutex);
+  const Lock lock(mutex);
   teller = std::this_thread::get_id();
-  while (const auto one = next()) report(*one, lock);
+  while (const auto one = next()) report(*one);
   reporting = false;
   teller = {};
 }
 
-void Events::State::report(const Waiting& one, Lock& lock) {
+void Events::State::report(const Waiting& one) {
   for (std::uint64_t last = 0;;) {
     const auto subscriber = subscribers.upper_bound(last);
     if (subscriber == subscribers.end() || subscriber->first > one.last_subscriber) return;
     last = running = subscriber->first;
     auto callback = subscriber->second;
-    lock.unlock();
+    mutex.unlock();
     (*callback)(one.change);
     callback.reset();  // objects it holds are destroyed before the end of the call is reported
-    lock.lock();
+    mutex.lock();
     running = 0;
     told.notify_all();
   }

@@ -58,17 +58,17 @@ Result<Watched::Plan> WatchedPartition::plan(const Context& context) {
   Plan plan;
   Owner owner = kHeldHere;
   {
-    const Lock lock(context.structure.mutex);
-    const Directory& directory = context.structure.directory;
-    const auto known = directory.owner(name_);
+    Structure& structure = context.structure;
+    const Lock lock(structure.mutex);
+    const auto known = structure.directory.owner(name_);
     if (!known) return fail(Errc::kUnknownPartition, "no partition " + quote(name_));
-    if (auto ready = route_to(directory, *known, {}); !ready) {
+    if (auto ready = route_to(structure.directory, *known, {}); !ready) {
       return tl::unexpected(std::move(ready.error()));
     }
     owner = *known;
-    const auto serving = directory.serving(name_);
+    const auto serving = structure.directory.serving(name_);
     found.incarnation = owner == kHeldHere ? own_incarnation : serving ? serving->incarnation : 0;
-    for (FrameInfo& frame : context.structure.forest.frames()) {
+    for (FrameInfo& frame : structure.forest.frames()) {
       if (frame.owner != owner) continue;
       found.frames.push_back({std::move(frame.id), std::move(frame.parent)});
     }

@@ -258,8 +258,8 @@ Result<WatchRoute> WatchedPath::route(const Context& context) const {
   const auto known =
       context.requests.know(names, OnDemand::kFresh, Deadline(context.options.timeout));
   const auto period = watch_period(options_.rate);
-  const Structure& structure = context.structure;
-  const Lock lock(context.structure.mutex);
+  Structure& structure = context.structure;
+  const Lock lock(structure.mutex);
   auto route = frames_.empty() ? watch_route(structure.forest, structure.directory, a_, b_,
                                              options_.composed, period, own_incarnation)
                                : watch_route(structure.forest, structure.directory, frames_, period,
