@@ -251,14 +251,14 @@ Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Qu
 
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
                                 const WatchOptions& options) {
-  return participant_->watcher().watch(a, b, options).map([](auto path) {
+  return participant_->watches().watch(a, b, options).map([](auto path) {
     return PathWatch(path);
   });
 }
 
 Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
                                        const WatchOptions& options) {
-  return participant_->watcher().watch_edges(ids, options).map([](auto edges) {
+  return participant_->watches().watch_edges(ids, options).map([](auto edges) {
     return EdgesWatch(edges);
   });
 }
@@ -278,9 +278,9 @@ Result<void> Client::publish_clock(Time now) { return participant_->publish_cloc
 
 Result<PartitionWatch> Client::watch_partition(const std::string& partition,
                                                const PartitionWatchOptions& options) {
-  return participant_->watcher()
+  return participant_->watches()
       .watch_partition(partition, options.rate, options.on_news)
-      .map([](auto followed) { return PartitionWatch(std::move(followed)); });
+      .map([](auto watched) { return PartitionWatch(std::move(watched)); });
 }
 
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,

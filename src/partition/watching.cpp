@@ -295,4 +295,14 @@ std::optional<PushedValues> PushedPieces::add(const PushedValues& piece) {
   return std::move(whole_);
 }
 
+ReceivedGroup::Place ReceivedGroup::place(PushedValues& whole) {
+  const bool knows_all = covariances_.fill_in(whole.entries);
+  const Place place{whole.commit <= commit_, knows_all && whole.after <= commit_};
+  skip(whole);
+  if (place.follows_on) commit_ = std::max(commit_, whole.commit);
+  return place;
+}
+
+void ReceivedGroup::skip(const PushedValues& whole) { heard_ = std::max(heard_, whole.commit); }
+
 }  // namespace tfdude

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -105,6 +106,42 @@ class PushedPieces {
  private:
   PushedValues whole_;
   std::uint32_t next_ = 0;
+};
+
+/// A watcher's side of one group: puts together what comes of it, and notices what was lost.
+class ReceivedGroup {
+ public:
+  /// How values continue those before.
+  struct Place {
+    bool is_old = false;      ///< everything up to their commit was known
+    bool follows_on = false;  ///< nothing is missing before them
+  };
+
+  explicit ReceivedGroup(std::size_t edges) : covariances_(edges) {}
+
+  /// @return all values of a message, once its last piece has come. place() or skip() follows.
+  [[nodiscard]] std::optional<PushedValues> whole(const PushedValues& piece) {
+    return pieces_.add(piece);
+  }
+  /// The values are used: completes them.
+  [[nodiscard]] Place place(PushedValues& whole);
+  /// The values are left out, so they are missing.
+  void skip(const PushedValues& whole);
+
+  /// Whether all values have come once.
+  [[nodiscard]] bool answered() const { return commit_ != 0; }
+  /// Whether a message was lost, or has come before an earlier one.
+  [[nodiscard]] bool lacks() const { return commit_ == 0 || heard_ > commit_; }
+  /// Whether less has come than of another one.
+  [[nodiscard]] bool is_behind(const ReceivedGroup& other) const {
+    return commit_ < std::max(other.commit_, other.heard_);
+  }
+
+ private:
+  PushedPieces pieces_;
+  KnownCovariances covariances_;
+  std::uint64_t commit_ = 0;  // of the owner: complete up to this commit; 0: nothing yet
+  std::uint64_t heard_ = 0;   // the newest commit of which anything has come
 };
 
 }  // namespace tfdude

@@ -20,32 +20,33 @@ Error unsaved(const Reply& reply, const Error& why) {
 }  // namespace
 
 CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Periods periods)
-    : store_(std::move(store)), effects_(effects), periods_(periods) {}
+    : store_(std::move(store)),
+      effects_(effects),
+      periods_(periods),
+      rounds_(loop_, [this] { return run(); }) {}
 
 Result<void> CommitLoop::start() {
   const Ready ready = effects_.take(false);
   const Result<void> stored = store(ready);
   tell(ready, stored);
   if (!stored) return stored;
-  next_values_ = Clock::now() + periods_.values;
-  thread_ = std::thread([this] { run(); });
+  {
+    const Lock lock(mutex_);
+    next_values_ = Clock::now() + periods_.values;
+    started_ = true;
+  }
+  rounds_.ask();
   return {};
 }
 
 void CommitLoop::stop() {
-  {
-    const Lock lock(mutex_);
-    stopping_ = true;
-  }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
-}
-
-void CommitLoop::ask() {
-  if (asked_.exchange(true)) return;
-  // The lock prevents a notification between the thread's check and its sleep.
-  { const Lock lock(mutex_); }
-  changed_.notify_one();
+  rounds_.stop();
+  const Lock lock(mutex_);
+  if (!started_ || ended_) return;
+  next_values_ = {};
+  round();
+  ended_ = true;
+  done_.notify_all();
 }
 
 void CommitLoop::hurry() {
@@ -53,13 +54,15 @@ void CommitLoop::hurry() {
     const Lock lock(mutex_);
     hurried_ = true;
   }
-  changed_.notify_one();
+  rounds_.ask();
 }
 
 Result<void> CommitLoop::flush(Clock::time_point deadline) {
   Lock lock(mutex_);
   const std::uint64_t mine = ++wanted_;
-  changed_.notify_one();
+  lock.unlock();
+  rounds_.ask();
+  lock.lock();
   const bool in_time = done_.wait_until(
       lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) { return ended_ || done_up_to_ >= mine; });
   if (stored_up_to_ >= mine) return {};
@@ -74,30 +77,18 @@ std::optional<Error> CommitLoop::failure() const {
   return failure_;
 }
 
-void CommitLoop::run() {
-  Lock lock(mutex_);
-  while (!stopping_) {
-    const auto next = next_round();
-    if (next && *next <= Clock::now()) {
-      round();
-    } else if (next) {
-      changed_.wait_until(lock, *next);
-    } else {
-      changed_.wait(lock);
-    }
-  }
-  next_values_ = {};
-  round();
-  ended_ = true;
-  done_.notify_all();
+CommitLoop::Clock::time_point CommitLoop::run() {
+  const Lock lock(mutex_);
+  if (!started_) return Loop::kNever;
+  if (next_round() <= Clock::now()) round();
+  return next_round();
 }
 
-// Under the lock. Empty if there is nothing to do.
-std::optional<CommitLoop::Clock::time_point> CommitLoop::next_round() const {
-  if (hurried_ || wanted_ > done_up_to_) return Clock::time_point{};
-  std::optional<Clock::time_point> next;
+CommitLoop::Clock::time_point CommitLoop::next_round() const {
+  if (hurried_ || wanted_ > done_up_to_) return Clock::time_point::min();
+  auto next = Loop::kNever;
   if (asked_.load() || failure_) next = next_commit_;
-  if (store_ != nullptr) next = next ? std::min(*next, next_values_) : next_values_;
+  if (store_ != nullptr) next = std::min(next, next_values_);
   return next;
 }
 

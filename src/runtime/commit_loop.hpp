@@ -5,10 +5,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
-#include <thread>
-#include <vector>
 
+#include "base/loop.hpp"
 #include "base/mutex.hpp"
 #include "partition/ready.hpp"
 #include "partition/state_store.hpp"
@@ -16,7 +14,7 @@
 namespace tfdude {
 
 /// Performs a member's Ready, in order: stores, publishes, replies. All on one thread, the only one
-/// that waits for the disk. Changes that have come meanwhile are stored together.
+/// that waits for the disk until stop(). Changes that have come meanwhile are stored together.
 ///
 /// If something could not be stored, nothing of it is published, and its requesters get kState.
 /// Storing is retried until it succeeds; meanwhile failure() says why further changes should be
@@ -25,7 +23,7 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe, except start(), which must precede stop().
 class CommitLoop {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = Loop::Clock;
   using Milliseconds = std::chrono::milliseconds;
 
   /// The source of the changes. Called on the loop's thread, which holds no lock; by start() on the
@@ -59,11 +57,14 @@ class CommitLoop {
   /// @return kState; the loop has then not started.
   [[nodiscard]] Result<void> start();
 
-  /// Stores and announces pending changes, and ends the loop. Later changes are not processed.
+  /// Ends the loop; then stores and announces pending changes, on the caller's thread. Later ones
+  /// are not processed.
   void stop();
 
   /// Requests a commit soon. A call costs nanoseconds, so a million calls a second are fine.
-  void ask();
+  void ask() {
+    if (!asked_.exchange(true)) rounds_.ask();
+  }
   /// Whether a requested commit has not started yet.
   [[nodiscard]] bool pending() const { return asked_.load(); }
 
@@ -78,8 +79,8 @@ class CommitLoop {
   [[nodiscard]] std::optional<Error> failure() const;
 
  private:
-  void run();
-  [[nodiscard]] std::optional<Clock::time_point> next_round() const TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] Clock::time_point run();
+  [[nodiscard]] Clock::time_point next_round() const TFDUDE_REQUIRES(mutex_);
   void round() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> store(const Ready& ready);
   void tell(const Ready& ready, const Result<void>& stored);
@@ -94,16 +95,16 @@ class CommitLoop {
   std::atomic<bool> failing_{false};  // whether failure_ is set
 
   mutable Mutex mutex_;
-  Condition changed_;
   Condition done_;
   bool hurried_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::uint64_t wanted_ TFDUDE_GUARDED_BY(mutex_) = 0;  // number of flush() calls
   std::uint64_t done_up_to_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::uint64_t stored_up_to_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::optional<Error> failure_ TFDUDE_GUARDED_BY(mutex_);
-  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
+  bool started_ TFDUDE_GUARDED_BY(mutex_) = false;
   bool ended_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // last: it uses the other members
+  Loop loop_{"tfdude-commit"};
+  Loop::Job rounds_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

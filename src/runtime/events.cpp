@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "base/mutex.hpp"
@@ -20,21 +21,25 @@ struct Waiting {
 }  // namespace
 
 struct Events::State {
-  /// The next change to report; empty at the end.
-  [[nodiscard]] std::optional<Waiting> next(Lock& lock) TFDUDE_REQUIRES(mutex);
+  /// Reports all changes in the queue.
+  void report();
+  void report(const Waiting& one) TFDUDE_REQUIRES(mutex);
+  /// The next change to report; empty if there is none.
+  [[nodiscard]] std::optional<Waiting> next() TFDUDE_REQUIRES(mutex);
 
   Mutex mutex;
-  Condition changed;
+  Condition told;
   std::map<std::uint64_t, std::shared_ptr<const Callback>> subscribers TFDUDE_GUARDED_BY(mutex);
-  std::uint64_t last_subscriber = 0;
+  std::uint64_t last_subscriber TFDUDE_GUARDED_BY(mutex) = 0;
   std::uint64_t running TFDUDE_GUARDED_BY(mutex) = 0;  // the subscriber being called
   std::thread::id teller TFDUDE_GUARDED_BY(mutex);
   std::deque<Waiting> waiting TFDUDE_GUARDED_BY(mutex);
   std::size_t missed TFDUDE_GUARDED_BY(mutex) = 0;
+  bool reporting TFDUDE_GUARDED_BY(mutex) = false;  // or about to
   bool stopping TFDUDE_GUARDED_BY(mutex) = false;
 };
 
-Events::Events() : state_(std::make_shared<State>()) {}
+Events::Events(Callbacks& callbacks) : state_(std::make_shared<State>()), line_(callbacks.line()) {}
 
 Events::~Events() { stop(); }
 
@@ -42,10 +47,6 @@ std::uint64_t Events::subscribe(Callback callback) {
   const Lock lock(state_->mutex);
   const std::uint64_t subscriber = ++state_->last_subscriber;
   if (state_->stopping) return subscriber;
-  if (!thread_.joinable()) {
-    thread_ = std::thread([state = state_] { run(*state); });
-    state_->teller = thread_.get_id();
-  }
   state_->subscribers.emplace(subscriber, std::make_shared<const Callback>(std::move(callback)));
   return subscriber;
 }
@@ -59,7 +60,7 @@ void Events::unsubscribe(std::uint64_t subscriber) {
     state_->subscribers.erase(found);
   }
   if (state_->teller != std::this_thread::get_id()) {
-    state_->changed.wait(
+    state_->told.wait(
         lock, [&]() TFDUDE_REQUIRES(state_->mutex) { return state_->running != subscriber; });
   }
   lock.unlock();
@@ -76,32 +77,24 @@ void Events::post(std::vector<Change> changes) {
         ++state_->missed;
       }
     }
+    if (std::exchange(state_->reporting, true)) return;
   }
-  state_->changed.notify_all();
+  line_->post([state = state_] { state->report(); });
 }
 
 void Events::stop() {
   std::map<std::uint64_t, std::shared_ptr<const Callback>> dropped;  // destroyed without the lock
-  std::thread thread;
   {
     const Lock lock(state_->mutex);
     state_->stopping = true;
     dropped.swap(state_->subscribers);
-    thread.swap(thread_);
+    state_->waiting.clear();
   }
-  state_->changed.notify_all();
-  if (!thread.joinable()) return;
-  if (thread.get_id() == std::this_thread::get_id()) {
-    thread.detach();  // it ends with the listener that calls this
-  } else {
-    thread.join();
-  }
+  line_->close();
 }
 
-std::optional<Waiting> Events::State::next(Lock& lock) {
-  changed.wait(
-      lock, [this]() TFDUDE_REQUIRES(mutex) { return stopping || !waiting.empty() || missed > 0; });
-  if (stopping) return std::nullopt;
+std::optional<Waiting> Events::State::next() {
+  if (stopping || (waiting.empty() && missed == 0)) return std::nullopt;
   if (waiting.empty()) {
     Change change{ChangeKind::kMissed, {}, {}, {}, {}, {}, {}};
     change.message = std::to_string(std::exchange(missed, 0)) +
@@ -113,23 +106,26 @@ std::optional<Waiting> Events::State::next(Lock& lock) {
   return first;
 }
 
-void Events::run(State& state) {
-  Lock lock(state.mutex);
-  while (const auto waiting = state.next(lock)) {
-    for (std::uint64_t told = 0;;) {
-      const auto subscriber = state.subscribers.upper_bound(told);
-      if (subscriber == state.subscribers.end() || subscriber->first > waiting->last_subscriber) {
-        break;
-      }
-      told = state.running = subscriber->first;
-      auto callback = subscriber->second;
-      lock.unlock();
-      (*callback)(waiting->change);
-      callback.reset();  // objects it holds are destroyed before the end of the call is reported
-      lock.lock();
-      state.running = 0;
-      state.changed.notify_all();
-    }
+void Events::State::report() {
+  const Lock lock(mutex);
+  teller = std::this_thread::get_id();
+  while (const auto one = next()) report(*one);
+  reporting = false;
+  teller = {};
+}
+
+void Events::State::report(const Waiting& one) {
+  for (std::uint64_t last = 0;;) {
+    const auto subscriber = subscribers.upper_bound(last);
+    if (subscriber == subscribers.end() || subscriber->first > one.last_subscriber) return;
+    last = running = subscriber->first;
+    auto callback = subscriber->second;
+    mutex.unlock();
+    (*callback)(one.change);
+    callback.reset();  // objects it holds are destroyed before the end of the call is reported
+    mutex.lock();
+    running = 0;
+    told.notify_all();
   }
 }
 

@@ -3,15 +3,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "partition/change_log.hpp"
+#include "runtime/callbacks.hpp"
 
 namespace tfdude {
 
-/// Reports changes to listeners, one after the other, from its own thread, which holds no lock
-/// meanwhile. Thread-safe.
+/// Reports changes to listeners, one after the other: on one line of the callbacks. Thread-safe.
 ///
 /// After unsubscribe() has returned, the listener is not running and will not run; it has been
 /// destroyed, unless it is held elsewhere. After stop() has returned this is so for all listeners.
@@ -25,7 +24,7 @@ class Events {
   /// Maximum number of changes in the queue; of others only the number is reported.
   static constexpr std::size_t kMaxWaiting = 65'536;
 
-  Events();
+  explicit Events(Callbacks& callbacks);
   ~Events();
   Events(const Events&) = delete;
   Events& operator=(const Events&) = delete;
@@ -37,16 +36,14 @@ class Events {
 
   void post(std::vector<Change> changes);
 
-  /// Ends reporting; queued changes are dropped. May be called repeatedly, by one thread.
+  /// Ends reporting; queued changes are dropped.
   void stop();
 
  private:
   struct State;
-  static void run(State& state);
 
-  const std::shared_ptr<State>
-      state_;           // the thread may outlive this object if a listener has stopped it
-  std::thread thread_;  // from the first subscription on; under the state's lock
+  const std::shared_ptr<State> state_;  // a listener that is running may outlive this object
+  const std::shared_ptr<Callbacks::Line> line_;
 };
 
 }  // namespace tfdude

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 
 namespace tfdude {
 
@@ -16,8 +16,11 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class JointCalls {
  public:
-  JointCalls(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
-      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
+  explicit JointCalls(const Context& context)
+      : structure_(context.structure),
+        discovery_(context.discovery),
+        requests_(context.requests),
+        member_(context.member) {}
 
   [[nodiscard]] Result<void> update(const JointUpdate& update);
   [[nodiscard]] Result<void> publish(const JointUpdate& update);

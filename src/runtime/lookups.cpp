@@ -18,15 +18,15 @@ Error not_asked_yet(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-Lookups::Lookups(Structure& structure, Discovery& discovery, Requests& requests,
-                 Transport& transport, const Watcher& watcher, Milliseconds timeout)
-    : structure_(structure),
-      discovery_(discovery),
-      requests_(requests),
-      timeout_(timeout),
-      pending_(structure.forest, requests.calls(), hints_, links(transport, watcher)) {}
+Lookups::Lookups(const Context& context, const WatchClient& watches)
+    : structure_(context.structure),
+      discovery_(context.discovery),
+      requests_(context.requests),
+      timeout_(context.options.timeout),
+      pending_(context.structure.forest, context.requests.calls(), hints_, context.threads,
+               links(context.transport, watches)) {}
 
-PendingLookups::Links Lookups::links(Transport& transport, const Watcher& watcher) {
+PendingLookups::Links Lookups::links(Transport& transport, const WatchClient& watches) {
   return {[this](const PendingLookups::Wanted& wanted) { return plan(wanted); },
           [&transport](const std::string& partition, const Request& request) -> Result<void> {
             auto sent = transport.send(partition, request, Deadline::Clock::now());
@@ -34,8 +34,8 @@ PendingLookups::Links Lookups::links(Transport& transport, const Watcher& watche
             return sent;
           },
           [this](const Request& request) { return requests_.answer_here(request); },
-          [&watcher](const PendingLookups::Wanted& wanted) {
-            return watcher.can_answer(wanted.a, wanted.b, wanted.query);
+          [&watches](const PendingLookups::Wanted& wanted) {
+            return watches.can_answer(wanted.a, wanted.b, wanted.query);
           },
           [this](Error last, const Deadline& deadline) {
             return requests_.last_word(std::move(last), deadline);
@@ -131,7 +131,7 @@ Result<StampedTransform> Lookups::wait(std::string_view a, std::string_view b, c
 std::shared_ptr<void> Lookups::start(const std::string& a, const std::string& b, const Query& query,
                                      Milliseconds wait, PendingLookups::Callback callback) {
   auto call = pending_.add({a, b, query}, Deadline(wait), not_asked_yet(a, b), std::move(callback));
-  return {nullptr, [call](void*) { call->cancel(); }};
+  return {nullptr, [call](void*) { call->close(); }};
 }
 
 std::future<Result<StampedTransform>> Lookups::start(const std::string& a, const std::string& b,

@@ -14,8 +14,7 @@
 #include "runtime/pending_lookups.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
-#include "runtime/watcher.hpp"
-#include "transport/port.hpp"
+#include "runtime/watch_client.hpp"
 
 namespace tfdude {
 
@@ -24,10 +23,8 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe; local data is read without a lock.
 class Lookups {
  public:
-  /// @param watcher  of values that others push
-  /// @param timeout  of one attempt of a waiting lookup
-  Lookups(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
-          const Watcher& watcher, Milliseconds timeout);
+  /// @param watches  of values that others push
+  Lookups(const Context& context, const WatchClient& watches);
 
   /// Ends all waiting lookups and callbacks: as PendingLookups::stop().
   void stop() { pending_.stop(); }
@@ -86,7 +83,7 @@ class Lookups {
 
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
                                                    const Query& query, const Deadline& deadline);
-  [[nodiscard]] PendingLookups::Links links(Transport& transport, const Watcher& watcher);
+  [[nodiscard]] PendingLookups::Links links(Transport& transport, const WatchClient& watches);
   /// As route_lookup(). @return also kInvalidInput if ages are wanted, and clocks differ
   [[nodiscard]] Result<LookupPlan> routed(const Directory& directory, const std::string& a,
                                           const std::string& b, const Query& query,

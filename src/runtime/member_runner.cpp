@@ -38,22 +38,23 @@ void log_outcome(const Outcome& outcome, const std::string& own) {
 
 }  // namespace
 
-MemberRunner::MemberRunner(Structure& structure, Transport& transport, std::string partition,
-                           Parts parts)
-    : structure_(structure),
-      transport_(transport),
+MemberRunner::MemberRunner(const Context& context, std::string partition, Listeners& listeners)
+    : structure_(context.structure),
+      transport_(context.transport),
       name_(std::move(partition)),
-      parts_(std::move(parts)),
-      member_(structure.forest, structure.directory, name_) {}
+      listeners_(listeners),
+      member_(context.structure.forest, context.structure.directory, name_),
+      events_(std::make_shared<Events>(context.threads.callbacks)),
+      gone_looks_(
+          context.threads.calls,
+          [this] {
+            input([](Member& member) { member.on_time(Clock::now()); });
+            return Loop::kNever;
+          },
+          kLookForGone) {}
 
 void MemberRunner::stop() {
-  Deferred* look = nullptr;
-  {
-    const Lock lock(gone_mutex_);
-    stopped_ = true;
-    if (gone_look_) look = &*gone_look_;
-  }
-  if (look != nullptr) look->stop();
+  gone_looks_.stop();
   if (commits_) commits_->stop();
 }
 
@@ -97,13 +98,13 @@ Outcome MemberRunner::take_outcome() {
 
 void MemberRunner::react(const Outcome& outcome) {
   if (outcome.heard || outcome.routes) structure_.changed.notify_all();
-  if (outcome.routes) parts_.on_routes();
+  if (outcome.routes) listeners_.on_routes();
   if (outcome.to_commit) commits_->ask();
   if (outcome.to_reply) commits_->hurry();
-  if (outcome.to_yield) parts_.on_contest();
-  if (outcome.look_for_gone) look_for_gone();
-  if (outcome.stopped) parts_.on_gone(outcome.stopped->partition);
-  if (outcome.lost) parts_.on_gone(*outcome.lost);
+  if (outcome.to_yield) listeners_.on_contest();
+  if (outcome.look_for_gone) gone_looks_.ask();
+  if (outcome.stopped) listeners_.on_gone(outcome.stopped->partition);
+  if (outcome.lost) listeners_.on_gone(*outcome.lost);
   log_outcome(outcome, name_);
 }
 
@@ -116,16 +117,6 @@ void MemberRunner::report_clocks(const Presence& appeared) {
       "the clocks differ: partition {} uses the {} clock, and partition {} the {} clock; "
       "their stamps cannot be compared",
       quote(appeared.partition), to_string(theirs), quote(name_), to_string(own));
-}
-
-void MemberRunner::look_for_gone() {
-  const Lock lock(gone_mutex_);
-  if (stopped_) return;
-  if (!gone_look_) {
-    gone_look_.emplace(kLookForGone,
-                       [this] { input([](Member& member) { member.on_time(Clock::now()); }); });
-  }
-  gone_look_->ask();
 }
 
 void MemberRunner::on_page(const Page& page) {

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -14,11 +13,9 @@
 #include "base/mutex.hpp"
 #include "partition/member.hpp"
 #include "runtime/commit_loop.hpp"
+#include "runtime/context.hpp"
 #include "runtime/deadline.hpp"
-#include "runtime/deferred.hpp"
 #include "runtime/events.hpp"
-#include "runtime/structure.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -32,16 +29,20 @@ class MemberRunner final : private CommitLoop::Effects {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Notified of changes, by the thread that brought them.
-  struct Parts {
-    std::function<void()> on_routes;  ///< what a plan would find has changed
+  /// The parts that are notified of changes, by the thread that brought them.
+  class Listeners {
+   public:
+    virtual ~Listeners() = default;
+    /// What a plan would find has changed.
+    virtual void on_routes() = 0;
     /// The partition was stopped, or is lost.
-    std::function<void(const std::string& partition)> on_gone;
-    std::function<void()> on_contest;  ///< a yield may be pending
+    virtual void on_gone(const std::string& partition) = 0;
+    /// A yield may be pending.
+    virtual void on_contest() = 0;
   };
 
   /// @param partition  the partition to own; empty: none
-  MemberRunner(Structure& structure, Transport& transport, std::string partition, Parts parts);
+  MemberRunner(const Context& context, std::string partition, Listeners& listeners);
   ~MemberRunner() override { stop(); }
   MemberRunner(const MemberRunner&) = delete;
   MemberRunner& operator=(const MemberRunner&) = delete;
@@ -105,6 +106,10 @@ class MemberRunner final : private CommitLoop::Effects {
     const Lock lock(structure_.mutex);
     return use(member_);
   }
+  /// Of the own partition; 0 if there is none.
+  [[nodiscard]] std::uint64_t incarnation() {
+    return with_rules([](const Member& member) { return member.presence().incarnation; });
+  }
 
   // ---- changes
 
@@ -142,25 +147,22 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] Outcome take_outcome() TFDUDE_REQUIRES(structure_.mutex);
   void react(const Outcome& outcome);
   void report_clocks(const Presence& appeared);
-  void look_for_gone();
   /// Why changes are rejected while earlier ones cannot be stored.
   [[nodiscard]] std::optional<Error> refusal() const;
 
   Structure& structure_;
   Transport& transport_;
   const std::string name_;
-  const Parts parts_;
+  Listeners& listeners_;
   Member member_ TFDUDE_GUARDED_BY(structure_.mutex);
   Partition* partition_ = nullptr;  // owned by member_
   std::atomic<bool> out_{false};
   std::atomic<bool> clocks_reported_{false};
-  const std::shared_ptr<Events> events_ = std::make_shared<Events>();
+  const std::shared_ptr<Events> events_;
   Mutex joints_mutex_{LockRank::kJoints};  // guards the joints of partition_
   // Both stop before the transport does.
-  std::optional<CommitLoop> commits_;   // set once, before partition_
-  Mutex gone_mutex_{LockRank::kParts};  // guards the following members
-  bool stopped_ TFDUDE_GUARDED_BY(gone_mutex_) = false;
-  std::optional<Deferred> gone_look_ TFDUDE_GUARDED_BY(gone_mutex_);  // once a partition is silent
+  std::optional<CommitLoop> commits_;  // set once, before partition_
+  Loop::Job gone_looks_;               // last: it uses the other members
 };
 
 }  // namespace tfdude

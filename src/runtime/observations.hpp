@@ -7,9 +7,8 @@
 #include <vector>
 
 #include "partition/observing.hpp"
-#include "runtime/discovery.hpp"
+#include "runtime/context.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 
 namespace tfdude {
 
@@ -18,8 +17,8 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class Observations {
  public:
-  Observations(Structure& structure, Discovery& discovery, Requests& requests)
-      : structure_(structure), discovery_(discovery), requests_(requests) {}
+  explicit Observations(const Context& context)
+      : structure_(context.structure), discovery_(context.discovery), requests_(context.requests) {}
 
   [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
                                          const Transform& X_AB, std::optional<Time> stamp,

@@ -22,6 +22,8 @@ class OpenGroups {
 
   [[nodiscard]] bool contains(std::uint64_t group) const { return last_used_.count(group) > 0; }
 
+  [[nodiscard]] bool empty() const { return last_used_.empty(); }
+
   void insert(std::uint64_t group, Clock::time_point now) { last_used_[group] = now; }
 
   /// Removes the groups that must be closed.

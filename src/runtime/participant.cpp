@@ -7,7 +7,6 @@
 
 #include "base/log.hpp"
 #include "base/stamp.hpp"
-#include "runtime/stream_links.hpp"
 
 namespace tfdude {
 namespace {
@@ -20,45 +19,35 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
     : options_(options),
       structure_(options.clock, partition),
       transport_(std::move(transport)),
+      context_{options_, structure_, *transport_, discovery_, member_, requests_, threads_},
       discovery_(structure_, *transport_, options.discovery, options.timeout),
-      member_(structure_, *transport_, std::move(partition), parts()),
+      member_(context_, std::move(partition), *this),
       requests_(structure_, discovery_, *transport_, own(), follow()),
-      yielding_(structure_, requests_, member_, options.timeout),
-      serving_(structure_, discovery_, *transport_, member_, options_),
-      queries_(structure_, discovery_, requests_, member_, *transport_),
-      writes_(structure_, discovery_, requests_, member_),
-      joints_(structure_, discovery_, requests_, member_),
-      observations_(structure_, discovery_, requests_),
-      watcher_(
-          structure_, discovery_, requests_, *transport_,
-          [this] {
-            return member_.with_rules(
-                [](const Member& member) { return member.presence().incarnation; });
-          },
-          options.timeout),
-      pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
-      lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
-      velocities_(structure_, requests_, lookups_),
+      yielding_(context_),
+      serving_(context_),
+      queries_(context_),
+      writes_(context_),
+      joints_(context_),
+      observations_(context_),
+      watches_(context_),
+      watch_server_(context_, watches_),
+      lookups_(context_, watches_),
+      velocities_(context_, lookups_),
       descriptions_(requests_, options.description),
-      streams_(edge_links(structure_, *transport_, member_),
-               joint_links(structure_, *transport_, member_)) {
+      streams_(context_) {
   const Lock lock(structure_.mutex);
   if (!wants_pages()) structure_.directory.do_without_pages();
 }
 
-MemberRunner::Parts Participant::parts() {
-  return {[this] {
-            watcher_.look_again();
-            streams_.look_again();
-            lookups_.look_again();
-          },
-          [this](const std::string& partition) { requests_.calls().on_lost(partition); },
-          [this] { yielding_.ask(); }};
+void Participant::on_routes() {
+  watches_.look_again();
+  streams_.look_again();
+  lookups_.look_again();
 }
 
 std::optional<Requests::Follow> Participant::follow() {
   if (!options_.follow) return std::nullopt;
-  return Requests::Follow{*options_.follow, parts().on_routes};
+  return Requests::Follow{*options_.follow, [this] { on_routes(); }};
 }
 
 // A stream learns of new owners by pages only.
@@ -85,10 +74,11 @@ Participant::~Participant() {
   // Callbacks may use all other parts.
   lookups_.stop();
   member_.stop_events();
+  threads_.callbacks.stop();
   streams_.stop();
   // The transport's threads use these until it has stopped.
-  watcher_.stop();
-  pushing_.stop();
+  watches_.stop();
+  watch_server_.stop();
   yielding_.stop();
   member_.stop();
   if (auto flushed = flush(std::min(options_.linger, options_.timeout)); !flushed) {
@@ -99,7 +89,6 @@ Participant::~Participant() {
 }
 
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
-  yielding_.start();
   return serving_.serve(frames);
 }
 
@@ -136,7 +125,7 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
   if (std::holds_alternative<HistoryRequest>(request.body)) {
     return member_.partition()->answer_history(request);
   }
-  if (std::holds_alternative<WatchRequest>(request.body)) return pushing_.answer(request);
+  if (std::holds_alternative<WatchRequest>(request.body)) return watch_server_.answer(request);
   if (std::holds_alternative<FramesRequest>(request.body)) return answer_frames(request);
   if (std::holds_alternative<DescriptionRequest>(request.body))
     return descriptions_.answer(request);
@@ -164,7 +153,7 @@ Reply Participant::answer_frames(const Request& request) {
 
 RefusedCounts Participant::refused() {
   RefusedCounts counts;
-  counts.watches = pushing_.refused();
+  counts.watches = watch_server_.refused();
   counts.dropped_samples = structure_.forest.dropped_samples();
   counts.messages = transport_->dropped();
   const Lock lock(structure_.mutex);
@@ -184,7 +173,7 @@ void Participant::on_update(const Update& update) {
 }
 
 void Participant::on_pushed(const PushedValues& pushed) {
-  if (watcher_.on_pushed(pushed)) lookups_.pushed();
+  if (watches_.on_pushed(pushed)) lookups_.pushed();
 }
 
 bool Participant::owns_joint(std::string_view name) const {

@@ -11,23 +11,21 @@
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/refused.hpp"
 
+#include "runtime/context.hpp"
 #include "runtime/descriptions.hpp"
-#include "runtime/discovery.hpp"
 #include "runtime/joint_calls.hpp"
 #include "runtime/lookups.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/observations.hpp"
-#include "runtime/pushing.hpp"
 #include "runtime/queries.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/serving.hpp"
 #include "runtime/streams.hpp"
-#include "runtime/structure.hpp"
 #include "runtime/velocities.hpp"
-#include "runtime/watcher.hpp"
+#include "runtime/watch_client.hpp"
+#include "runtime/watch_server.hpp"
 #include "runtime/writes.hpp"
 #include "runtime/yielding.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -35,7 +33,7 @@ namespace tfdude {
 /// message and each request of a client to the part responsible.
 /// @par Thread safety  All functions are thread-safe, except start() and serve(), which are called
 ///   first, by one thread.
-class Participant final : public TransportHandler {
+class Participant final : public TransportHandler, private MemberRunner::Listeners {
  public:
   /// @param partition  the partition to own; empty: none
   Participant(TransportPtr transport, std::string partition, const Options& options);
@@ -56,7 +54,7 @@ class Participant final : public TransportHandler {
   [[nodiscard]] Writes& writes() { return writes_; }
   [[nodiscard]] JointCalls& joints() { return joints_; }
   [[nodiscard]] Observations& observations() { return observations_; }
-  [[nodiscard]] Watcher& watcher() { return watcher_; }
+  [[nodiscard]] WatchClient& watches() { return watches_; }
   [[nodiscard]] Lookups& lookups() { return lookups_; }
   [[nodiscard]] Velocities& velocities() { return velocities_; }
   [[nodiscard]] Descriptions& descriptions() { return descriptions_; }
@@ -87,7 +85,7 @@ class Participant final : public TransportHandler {
   void on_update(const Update& update) override;
   void on_joints(const JointUpdate& update) override { joints_.on_joints(update); }
   void on_pushed(const PushedValues& pushed) override;
-  void on_watcher(std::uint64_t group) override { pushing_.on_watcher(group); }
+  void on_watcher(std::uint64_t group) override { watch_server_.on_watcher(group); }
   void on_page(const Page& page) override {
     if (wants_pages()) member_.on_page(page);
   }
@@ -108,7 +106,11 @@ class Participant final : public TransportHandler {
   [[nodiscard]] bool owns_joints() const override;
 
  private:
-  [[nodiscard]] MemberRunner::Parts parts();
+  // MemberRunner::Listeners
+  void on_routes() override;
+  void on_gone(const std::string& partition) override { requests_.calls().on_lost(partition); }
+  void on_contest() override { yielding_.ask(); }
+
   [[nodiscard]] Requests::Own own();
   [[nodiscard]] std::optional<Requests::Follow> follow();
   [[nodiscard]] Reply answer_frames(const Request& request);
@@ -118,6 +120,8 @@ class Participant final : public TransportHandler {
   const Options options_;
   Structure structure_;
   TransportPtr transport_;
+  Threads threads_;
+  const Context context_;
   Discovery discovery_;
   MemberRunner member_;
   Requests requests_;
@@ -127,8 +131,8 @@ class Participant final : public TransportHandler {
   Writes writes_;
   JointCalls joints_;
   Observations observations_;
-  Watcher watcher_;
-  Pushing pushing_;
+  WatchClient watches_;
+  WatchServer watch_server_;
   Lookups lookups_;
   Velocities velocities_;
   Descriptions descriptions_;

@@ -41,29 +41,35 @@ bool is_worth_waiting(const Error& error, const Query& query) {
   }
 }
 
-PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links)
-    : forest_(forest), calls_(calls), hints_(hints), links_(std::move(links)) {}
+PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Threads& threads,
+                               Links links)
+    : forest_(forest),
+      calls_(calls),
+      hints_(hints),
+      links_(std::move(links)),
+      callbacks_(threads.callbacks),
+      attends_(threads.calls, [this] { return run(); }) {}
 
 void PendingLookups::stop() {
   {
     const Lock lock(mutex_);
     stopping_ = true;
   }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
-  All left;
+  attends_.stop();
+  forest_.on_commit(nullptr, this);
+  All left = std::exchange(all_, {});
   {
     const Lock lock(mutex_);
-    left = std::exchange(added_, {});
+    std::move(added_.begin(), added_.end(), std::back_inserter(left));
+    added_.clear();
   }
   // Here, since objects held by callbacks are destroyed with them.
   for (const auto& lookup : left) give_up(*lookup);
-  callbacks_.stop();
 }
 
 void PendingLookups::give_up(Lookup& lookup) {
   if (lookup.callback != nullptr) {
-    lookup.callback->cancel();
+    lookup.callback->close();
   } else {
     lookup.promise.set_value(
         fail(Errc::kTimeout,
@@ -79,10 +85,12 @@ std::future<PendingLookups::Found> PendingLookups::add(Wanted wanted, const Dead
   return future;
 }
 
-std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
-    Wanted wanted, const Deadline& deadline, Error last, OneCall<Found>::Function callback) {
+std::shared_ptr<Callbacks::Line> PendingLookups::add(Wanted wanted, const Deadline& deadline,
+                                                     Error last, Callback callback) {
   auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
-  auto call = lookup->callback = std::make_shared<OneCall<Found>>(std::move(callback));
+  auto found = lookup->found = std::make_shared<Found>();
+  auto call = lookup->callback = callbacks_.line();
+  call->prepare([found, callback = std::move(callback)] { callback(std::move(*found)); });
   add(std::move(lookup));
   return call;
 }
@@ -90,11 +98,9 @@ std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
 void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
   {
     const Lock lock(mutex_);
-    if (!stopping_) {
-      if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
-      added_.push_back(std::move(lookup));
-    }
+    if (!stopping_) added_.push_back(std::move(lookup));
   }
+  waiting_ = true;
   if (lookup != nullptr) {
     give_up(*lookup);
   } else {
@@ -102,52 +108,39 @@ void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
   }
 }
 
-// May be called with the forest's lock held.
-void PendingLookups::wake(std::atomic<bool>& why) {
-  if (why.exchange(true)) return;
-  // The lock prevents a notification between the thread's check and its sleep.
-  { const Lock lock(mutex_); }
-  changed_.notify_one();
-}
-
 void PendingLookups::look_again() {
   ++routes_;
-  wake(written_);
+  if (waiting_.load()) wake(written_);
 }
 
 std::uint64_t PendingLookups::version() const {
   return forest_.structure_version() + routes_.load();
 }
 
-void PendingLookups::run() {
-  All all;
-  bool listens = false;
-  Lock lock(mutex_);
-  while (!stopping_) {
-    // Before the check, so that events meanwhile are not missed.
-    urgent_.store(false);
-    const bool written = written_.exchange(false);
-    std::move(added_.begin(), added_.end(), std::back_inserter(all));
-    added_.clear();
-    lock.unlock();
-    if (listens != !all.empty()) {
-      listens = !all.empty();
-      forest_.on_commit(listens ? [this] { wake(written_); } : std::function<void()>(), this);
-    }
-    const auto begin = Clock::now();
-    const auto next = attend(all, written);
-    const auto end = Clock::now();
-    const auto rested = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin),
-                                                                   kShortestRest, kLongestRest);
-    lock.lock();
-    const auto must = [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || urgent_.load(); };
-    changed_.wait_until(lock, std::min(next, rested), must);
-    changed_.wait_until(lock, next,
-                        [&]() TFDUDE_REQUIRES(mutex_) { return must() || written_.load(); });
+PendingLookups::Clock::time_point PendingLookups::run() {
+  const auto begin = Clock::now();
+  if (!urgent_.load() && begin < next_) {
+    if (!written_.load()) return next_;
+    if (begin < rests_until_) return std::min(next_, rests_until_);
   }
-  std::move(all.begin(), all.end(), std::back_inserter(added_));
-  lock.unlock();
-  forest_.on_commit(nullptr, this);
+  // Before the check, so that events meanwhile are not missed.
+  urgent_.store(false);
+  const bool written = written_.exchange(false);
+  {
+    const Lock lock(mutex_);
+    std::move(added_.begin(), added_.end(), std::back_inserter(all_));
+    added_.clear();
+    waiting_ = !all_.empty();
+  }
+  if (listens_ != !all_.empty()) {
+    listens_ = !all_.empty();
+    forest_.on_commit(listens_ ? [this] { wake(written_); } : std::function<void()>(), this);
+  }
+  next_ = attend(all_, written);
+  const auto end = Clock::now();
+  rests_until_ = end + std::clamp<std::chrono::nanoseconds>(kRest * (end - begin), kShortestRest,
+                                                            kLongestRest);
+  return next_;
 }
 
 /// @return when there is more to do
@@ -160,13 +153,12 @@ PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written)
     return false;
   };
   all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
-  if (const auto look = callbacks_.look_after(Clock::now())) next = std::min(next, *look);
   return next;
 }
 
 /// Each of the following returns true if the lookup is finished.
 bool PendingLookups::attend(Lookup& lookup, bool written) {
-  if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
+  if (lookup.callback != nullptr && lookup.callback->closed()) return true;
   if (lookup.asking) return go_on_asking(lookup);
   if (written && lookup.far) hurry(lookup);
   const auto now = Clock::now();
@@ -269,10 +261,8 @@ void PendingLookups::finish(Lookup& lookup, Found found) {
     lookup.promise.set_value(std::move(found));
     return;
   }
-  // If the job is dropped instead, objects held by its function are destroyed, too.
-  const std::shared_ptr<OneCall<Found>> call(lookup.callback.get(),
-                                             [owner = lookup.callback](auto*) { owner->cancel(); });
-  callbacks_.post([call, found = std::move(found)]() mutable { call->run(std::move(found)); });
+  *lookup.found = std::move(found);
+  lookup.callback->go();
 }
 
 }  // namespace tfdude

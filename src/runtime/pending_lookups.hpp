@@ -6,17 +6,15 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "tfdude/types/query.hpp"
 
 #include "base/mutex.hpp"
 #include "runtime/asking.hpp"
-#include "runtime/callbacks.hpp"
+#include "runtime/context.hpp"
 #include "runtime/deadline.hpp"
 #include "runtime/gathering.hpp"
-#include "runtime/one_call.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude {
@@ -24,10 +22,10 @@ namespace tfdude {
 /// Whether data that a lookup lacks may still come.
 [[nodiscard]] bool is_worth_waiting(const Error& error, const Query& query);
 
-/// The lookups of a participant that wait for their data. One thread attends to all of them. It
+/// The lookups of a participant that wait for their data. One job attends to all of them. It
 /// sleeps until the local forest is written, or the structure changes. Owners of missing data are
 /// polled at growing intervals, and asked again as soon as they have pushed sufficient data. The
-/// thread never waits for others, and runs no user code.
+/// job never waits for others, and runs no user code.
 /// @par Thread safety  All functions are thread-safe.
 class PendingLookups {
  public:
@@ -62,25 +60,27 @@ class PendingLookups {
     bool plan_asks = false;
   };
 
-  PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links);
+  PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Threads& threads, Links links);
   ~PendingLookups() { stop(); }
   PendingLookups(const PendingLookups&) = delete;
   PendingLookups& operator=(const PendingLookups&) = delete;
 
-  /// Waiting lookups get kTimeout; their callbacks are not called. After it has returned no
-  /// callback runs, except one that calls this.
+  /// Waiting lookups get kTimeout; their callbacks are not called.
   void stop();
 
   /// @param last  why there was no answer so far
   [[nodiscard]] std::future<Found> add(Wanted wanted, const Deadline& deadline, Error last);
-  [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
-                                                    Error last, OneCall<Found>::Function callback);
+  /// @return what calls the callback; closing it cancels the lookup
+  [[nodiscard]] std::shared_ptr<Callbacks::Line> add(Wanted wanted, const Deadline& deadline,
+                                                     Error last, Callback callback);
 
   /// What plan() would find has changed.
   void look_again();
 
-  /// Others have pushed values. Returns at once if no lookup waits.
-  void pushed() { wake(written_); }
+  /// Others have pushed values.
+  void pushed() {
+    if (waiting_.load()) wake(written_);
+  }
 
  private:
   struct Lookup {
@@ -92,9 +92,10 @@ class PendingLookups {
     Error last;
     // One of the two gets the answer.
     std::promise<Found> promise;
-    std::shared_ptr<OneCall<Found>> callback;
+    std::shared_ptr<Callbacks::Line> callback;  // prepared to be called
+    std::shared_ptr<Found> found;               // with this
 
-    // The following belong to the thread.
+    // The following belong to the job.
     const Clock::time_point began = Clock::now();
     Clock::time_point next = Clock::time_point::min();  // attempt, or check of requests in progress
     std::uint64_t version = 0;                          // of the structure at the last attempt
@@ -107,8 +108,11 @@ class PendingLookups {
   using All = std::vector<std::unique_ptr<Lookup>>;
 
   void add(std::unique_ptr<Lookup> lookup);
-  void wake(std::atomic<bool>& why);
-  void run();
+  /// May be called with the forest's lock held.
+  void wake(std::atomic<bool>& why) {
+    if (!why.exchange(true)) attends_.ask();
+  }
+  [[nodiscard]] Clock::time_point run();
   [[nodiscard]] Clock::time_point attend(All& all, bool written);
   [[nodiscard]] bool attend(Lookup& lookup, bool written);
   [[nodiscard]] bool attempt(Lookup& lookup);
@@ -125,17 +129,21 @@ class PendingLookups {
   Calls& calls_;
   SharedHints& hints_;
   const Links links_;
-  Callbacks callbacks_;
-  std::size_t count_ = 0;                 // number of waiting lookups; belongs to the thread
+  Callbacks& callbacks_;
   std::atomic<std::uint64_t> routes_{0};  // how often what plan() would find has changed
   std::atomic<bool> written_{false};      // new data may have arrived
   std::atomic<bool> urgent_{false};       // a new lookup or a reply has arrived
-  Mutex mutex_;                           // guards the following members, and the wait
-  Condition changed_;
-  All added_
-      TFDUDE_GUARDED_BY(mutex_);  // not yet taken by the thread; after its end, the remaining ones
+  std::atomic<bool> waiting_{false};      // there are lookups
+  Mutex mutex_;
+  All added_ TFDUDE_GUARDED_BY(mutex_);  // not yet taken by the job
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // from the first lookup on
+  // The following belong to the job.
+  All all_;
+  std::size_t count_ = 0;
+  bool listens_ = false;  // to commits
+  Clock::time_point next_ = Clock::time_point::max();
+  Clock::time_point rests_until_ = Clock::time_point::min();
+  Loop::Job attends_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

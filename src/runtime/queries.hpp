@@ -8,10 +8,9 @@
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/partition_info.hpp"
 
-#include "runtime/discovery.hpp"
+#include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 
 namespace tfdude {
 
@@ -20,13 +19,12 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class Queries {
  public:
-  Queries(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member,
-          const Transport& transport)
-      : structure_(structure),
-        discovery_(discovery),
-        requests_(requests),
-        member_(member),
-        transport_(transport) {}
+  explicit Queries(const Context& context)
+      : structure_(context.structure),
+        discovery_(context.discovery),
+        requests_(context.requests),
+        member_(context.member),
+        transport_(context.transport) {}
 
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Handle> find(std::string_view id);

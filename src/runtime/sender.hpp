@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -41,14 +40,16 @@ struct Destinations {
 
 /// What a sender needs of the participant.
 template <class Message>
-struct SenderLinks {
+class SenderLinks {
+ public:
+  virtual ~SenderLinks() = default;
   /// The current owners of each name.
-  std::function<std::vector<Destinations>(const std::vector<std::string>& names)> find;
-  std::function<std::unique_ptr<Channel<Message>>(const std::string& partition)> connect;
+  [[nodiscard]] virtual std::vector<Destinations> find(const std::vector<std::string>& names) = 0;
+  [[nodiscard]] virtual std::unique_ptr<Channel<Message>> connect(const std::string& partition) = 0;
   /// Applies it to this process's own part. Must not wait or, on success, allocate.
-  std::function<Result<void>(const Message&)> apply_here;
+  [[nodiscard]] virtual Result<void> apply_here(const Message& message) = 0;
   /// Whether this process has lost its partition. Must not wait.
-  std::function<bool()> out;
+  [[nodiscard]] virtual bool out() const = 0;
 };
 
 /// A sender of any kind, for the thread that plans for all.
@@ -69,7 +70,7 @@ template <class Message>
 class Sender final : public PlannedSender {
  public:
   /// @param names  without duplicates
-  Sender(std::vector<std::string> names, SenderLinks<Message> links)
+  Sender(std::vector<std::string> names, std::shared_ptr<SenderLinks<Message>> links)
       : names_(std::move(names)), links_(std::move(links)), listed_(names_.size(), 0) {
     not_sent_.reserve(names_.size());
   }
@@ -80,7 +81,7 @@ class Sender final : public PlannedSender {
     const Lock lock(planning_);
     mailbox_.collect();
     if (closed_) return;
-    auto found = links_.find(names_);
+    auto found = links_->find(names_);
     if (planned_ && found == found_) return;
     mailbox_.put(plan_for(found));
     found_ = std::move(found);
@@ -105,7 +106,7 @@ class Sender final : public PlannedSender {
     if (!sending_.try_lock()) return list_all(Errc::kTransport);
     const Lock lock(sending_, std::adopt_lock);
     if (closed_) return list_all(Errc::kTransport);
-    if (links_.out()) return list_all(Errc::kPartitionTaken);
+    if (links_->out()) return list_all(Errc::kPartitionTaken);
     for (std::size_t i = 0; i < names_.size(); ++i) {
       if (!valid(i)) list(i, Errc::kInvalidInput, {});
     }
@@ -152,7 +153,7 @@ class Sender final : public PlannedSender {
     }
     plan.shares.push_back({to.owner, to.partition, to.reachable, nullptr, {}, {}});
     Share& fresh = plan.shares.back();
-    if (to.owner != kHeldHere) fresh.channel = links_.connect(to.partition);
+    if (to.owner != kHeldHere) fresh.channel = links_->connect(to.partition);
     return fresh;
   }
 
@@ -176,7 +177,7 @@ class Sender final : public PlannedSender {
   std::optional<Errc> hand_over(Share& share) {
     if (!share.reachable) return Errc::kUnreachable;
     if (share.channel != nullptr) return share.channel->try_send(share.message);
-    const auto applied = links_.apply_here(share.message);
+    const auto applied = links_->apply_here(share.message);
     return applied ? std::nullopt : std::optional<Errc>(applied.error().code);
   }
 
@@ -195,7 +196,7 @@ class Sender final : public PlannedSender {
   }
 
   const std::vector<std::string> names_;
-  const SenderLinks<Message> links_;
+  const std::shared_ptr<SenderLinks<Message>> links_;
   Mutex planning_{LockRank::kPlanning};
   std::vector<Destinations> found_ TFDUDE_GUARDED_BY(planning_);
   bool planned_ TFDUDE_GUARDED_BY(planning_) = false;

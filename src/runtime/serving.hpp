@@ -5,12 +5,9 @@
 #include <vector>
 
 #include "tfdude/types/frame.hpp"
-#include "tfdude/types/options.hpp"
 
-#include "runtime/discovery.hpp"
+#include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
-#include "runtime/structure.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -18,13 +15,12 @@ namespace tfdude {
 /// process and the configuration, and announces the result. Not thread-safe.
 class Serving {
  public:
-  Serving(Structure& structure, Discovery& discovery, Transport& transport, MemberRunner& member,
-          const Options& options)
-      : structure_(structure),
-        discovery_(discovery),
-        transport_(transport),
-        member_(member),
-        options_(options) {}
+  explicit Serving(const Context& context)
+      : structure_(context.structure),
+        discovery_(context.discovery),
+        transport_(context.transport),
+        member_(context.member),
+        options_(context.options) {}
 
   /// @return kPartitionTaken, kState; the error of the first invalid frame
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);

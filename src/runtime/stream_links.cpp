@@ -1,6 +1,7 @@
 #include "runtime/stream_links.hpp"
 
 #include "base/mutex.hpp"
+#include "runtime/member_runner.hpp"
 
 namespace tfdude {
 namespace {
@@ -28,40 +29,60 @@ std::vector<Destinations> destinations(Structure& structure, const std::vector<s
   return found;
 }
 
-}  // namespace
+class EdgeLinks final : public SenderLinks<Update> {
+ public:
+  explicit EdgeLinks(const Context& context) : context_(context) {}
 
-SenderLinks<Update> edge_links(Structure& structure, Transport& transport, MemberRunner& member) {
-  SenderLinks<Update> links;
-  links.find = [&structure](const std::vector<std::string>& ids) {
+  std::vector<Destinations> find(const std::vector<std::string>& ids) override {
     const auto route_of = [&](const Directory&, const std::string& id) -> Result<Route> {
-      const auto frame = structure.forest.info(id);
+      const auto frame = context_.structure.forest.info(id);
       if (!frame) return fail(Errc::kUnknownFrame, "no frame");
       return Route{id, {frame->owner}};
     };
-    return destinations(structure, ids, route_of);
-  };
-  links.connect = [&transport](const std::string& to) { return transport.update_channel(to); };
-  links.apply_here = [&structure](const Update& update) {
-    return structure.forest.update(update.edges, update.stamp);
-  };
-  links.out = [&member] { return member.out(); };
-  return links;
+    return destinations(context_.structure, ids, route_of);
+  }
+  std::unique_ptr<Channel<Update>> connect(const std::string& partition) override {
+    return context_.transport.update_channel(partition);
+  }
+  Result<void> apply_here(const Update& update) override {
+    return context_.structure.forest.update(update.edges, update.stamp);
+  }
+  bool out() const override { return context_.member.out(); }
+
+ private:
+  const Context context_;
+};
+
+class JointLinks final : public SenderLinks<JointUpdate> {
+ public:
+  explicit JointLinks(const Context& context) : context_(context) {}
+
+  std::vector<Destinations> find(const std::vector<std::string>& names) override {
+    const auto route_of = [](const Directory& directory, const std::string& name) {
+      return directory.route_joint(name);
+    };
+    return destinations(context_.structure, names, route_of);
+  }
+  std::unique_ptr<Channel<JointUpdate>> connect(const std::string& partition) override {
+    return context_.transport.joint_channel(partition);
+  }
+  Result<void> apply_here(const JointUpdate& update) override {
+    return context_.member.try_apply(update).map([](std::size_t) {});
+  }
+  bool out() const override { return context_.member.out(); }
+
+ private:
+  const Context context_;
+};
+
+}  // namespace
+
+std::shared_ptr<SenderLinks<Update>> edge_links(const Context& context) {
+  return std::make_shared<EdgeLinks>(context);
 }
 
-SenderLinks<JointUpdate> joint_links(Structure& structure, Transport& transport,
-                                     MemberRunner& member) {
-  SenderLinks<JointUpdate> links;
-  links.find = [&structure](const std::vector<std::string>& names) {
-    return destinations(structure, names, [](const Directory& directory, const std::string& name) {
-      return directory.route_joint(name);
-    });
-  };
-  links.connect = [&transport](const std::string& to) { return transport.joint_channel(to); };
-  links.apply_here = [&member](const JointUpdate& update) {
-    return member.try_apply(update).map([](std::size_t) {});
-  };
-  links.out = [&member] { return member.out(); };
-  return links;
+std::shared_ptr<SenderLinks<JointUpdate>> joint_links(const Context& context) {
+  return std::make_shared<JointLinks>(context);
 }
 
 }  // namespace tfdude

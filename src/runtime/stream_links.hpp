@@ -1,18 +1,16 @@
 #pragma once
 
-#include "runtime/member_runner.hpp"
+#include <memory>
+
+#include "runtime/context.hpp"
 #include "runtime/sender.hpp"
-#include "runtime/structure.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
 /// The destinations of streams of edges.
-[[nodiscard]] SenderLinks<Update> edge_links(Structure& structure, Transport& transport,
-                                             MemberRunner& member);
+[[nodiscard]] std::shared_ptr<SenderLinks<Update>> edge_links(const Context& context);
 
 /// The destinations of streams of joints.
-[[nodiscard]] SenderLinks<JointUpdate> joint_links(Structure& structure, Transport& transport,
-                                                   MemberRunner& member);
+[[nodiscard]] std::shared_ptr<SenderLinks<JointUpdate>> joint_links(const Context& context);
 
 }  // namespace tfdude

@@ -9,6 +9,7 @@
 #include "base/mutex.hpp"
 #include "math/finite.hpp"
 #include "partition/joints.hpp"
+#include "runtime/stream_links.hpp"
 
 namespace tfdude {
 namespace {
@@ -33,15 +34,23 @@ Result<void> check_names(const std::vector<std::string>& names, const char* what
 
 }  // namespace
 
-Streams::Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints)
-    : of_edges_(std::move(of_edges)), of_joints_(std::move(of_joints)) {}
+Streams::Streams(const Context& context)
+    : of_edges_(edge_links(context)),
+      of_joints_(joint_links(context)),
+      plans_(
+          context.threads.calls,
+          [this] {
+            for (const auto& one : senders()) one->plan();
+            return Loop::kNever;
+          },
+          kPlanEvery) {}
 
 void Streams::stop() {
   {
     const Lock lock(mutex_);
     stopped_ = true;
   }
-  if (Deferred* planner = planning_.load()) planner->stop();
+  plans_.stop();
   for (const auto& sender : senders()) sender->close();
 }
 
@@ -62,16 +71,12 @@ void Streams::add(const std::shared_ptr<PlannedSender>& sender) {
     return;
   }
   senders_.push_back(sender);
-  if (planner_ != nullptr) return;
-  planner_ = std::make_unique<Deferred>(kPlanEvery, [this] {
-    for (const auto& one : senders()) one->plan();
-  });
-  planning_.store(planner_.get());
+  opened_ = true;
 }
 
 template <class Message>
 std::shared_ptr<Sender<Message>> Streams::open(const std::vector<std::string>& names,
-                                               const SenderLinks<Message>& links) {
+                                               const std::shared_ptr<SenderLinks<Message>>& links) {
   auto sender = std::make_shared<Sender<Message>>(names, links);
   // First, so that no change is missed meanwhile.
   add(sender);

@@ -6,16 +6,16 @@
 #include <vector>
 
 #include "base/mutex.hpp"
-#include "runtime/deferred.hpp"
+#include "runtime/context.hpp"
 #include "runtime/sender.hpp"
 
 namespace tfdude {
 
-/// The streams of a participant, and the thread that updates their destinations.
+/// The streams of a participant, and the job that updates their destinations.
 /// @par Thread safety  All functions are thread-safe.
 class Streams {
  public:
-  Streams(SenderLinks<Update> of_edges, SenderLinks<JointUpdate> of_joints);
+  explicit Streams(const Context& context);
   ~Streams() { stop(); }
   Streams(const Streams&) = delete;
   Streams& operator=(const Streams&) = delete;
@@ -30,23 +30,23 @@ class Streams {
 
   /// What a plan would find has changed.
   void look_again() {
-    if (Deferred* planner = planning_.load()) planner->ask();
+    if (opened_.load(std::memory_order_relaxed)) plans_.ask();
   }
 
  private:
   template <class Message>
   std::shared_ptr<Sender<Message>> open(const std::vector<std::string>& names,
-                                        const SenderLinks<Message>& links);
+                                        const std::shared_ptr<SenderLinks<Message>>& links);
   void add(const std::shared_ptr<PlannedSender>& sender);
   [[nodiscard]] std::vector<std::shared_ptr<PlannedSender>> senders();
 
-  const SenderLinks<Update> of_edges_;
-  const SenderLinks<JointUpdate> of_joints_;
+  const std::shared_ptr<SenderLinks<Update>> of_edges_;
+  const std::shared_ptr<SenderLinks<JointUpdate>> of_joints_;
   Mutex mutex_;
   std::vector<std::weak_ptr<PlannedSender>> senders_ TFDUDE_GUARDED_BY(mutex_);
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::unique_ptr<Deferred> planner_ TFDUDE_GUARDED_BY(mutex_);  // once there is a stream
-  std::atomic<Deferred*> planning_{nullptr};
+  std::atomic<bool> opened_{false};  // any
+  Loop::Job plans_;                  // last: it uses the other members
 };
 
 }  // namespace tfdude

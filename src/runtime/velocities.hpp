@@ -7,9 +7,9 @@
 
 #include "math/mean_velocity.hpp"
 #include "partition/observing.hpp"
+#include "runtime/context.hpp"
 #include "runtime/lookups.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 
 namespace tfdude {
 
@@ -17,8 +17,8 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class Velocities {
  public:
-  Velocities(Structure& structure, Requests& requests, Lookups& lookups)
-      : structure_(structure), requests_(requests), lookups_(lookups) {}
+  Velocities(const Context& context, Lookups& lookups)
+      : structure_(context.structure), requests_(context.requests), lookups_(lookups) {}
 
   [[nodiscard]] Result<Velocity> velocity(const std::string& a, const std::string& b,
                                           const VelocityQuery& query, const Deadline& deadline);

@@ -56,7 +56,7 @@ Result<WatchRoute> watch_route(const Forest& forest, const Directory& directory,
 
 WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
                          const EdgeTiming& timing)
-    : route_(std::move(route)), edges_(route_.edges.size()), sources_(route_.sources.size()) {
+    : route_(std::move(route)), edges_(route_.edges.size()) {
   // The owner judges a source's clock.
   EdgeTiming told = timing;
   told.restart_after = 0;
@@ -76,15 +76,15 @@ WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute 
   for (const FrameInfo& edge : route_.edges) {
     handles_.push_back(forest_.find(edge.id).value_or(Handle()));
   }
-  for (std::size_t i = 0; i < sources_.size(); ++i) {
-    for (const std::string& frame : route_.sources[i].frames) {
+  for (const WatchRoute::Source& source : route_.sources) {
+    sources_.push_back({{}, ReceivedGroup(source.frames.size())});
+    for (const std::string& frame : source.frames) {
       const auto edge = std::find_if(route_.edges.begin(), route_.edges.end(),
                                      [&](const FrameInfo& one) { return one.id == frame; });
       const auto index = static_cast<std::size_t>(edge - route_.edges.begin());
-      sources_[i].edges.push_back(static_cast<std::uint32_t>(index));
-      if (edge != route_.edges.end()) edges_[index].source = i;
+      sources_.back().edges.push_back(static_cast<std::uint32_t>(index));
+      if (edge != route_.edges.end()) edges_[index].source = sources_.size() - 1;
     }
-    sources_[i].covariances = KnownCovariances(sources_[i].edges.size());
   }
 }
 
@@ -145,16 +145,13 @@ bool WatchMirror::take(const PushedValues& pushed) {
                    [&](const WatchRoute::Source& source) { return source.group == pushed.group; });
   if (told == route_.sources.end()) return false;
   Source& source = sources_[static_cast<std::size_t>(told - route_.sources.begin())];
-  auto whole = source.pieces.add(pushed);
+  auto whole = source.received.whole(pushed);
   if (!whole) return false;
-  const bool knows_all = source.covariances.fill_in(whole->entries);
   // A complete commit that does not follow on may lack samples between those reported.
-  const bool is_old = whole->commit <= source.commit;
-  const bool follows_on = !is_old && whole->after <= source.commit && knows_all;
-  source.heard = std::max(source.heard, whole->commit);
+  const auto [is_old, in_order] = source.received.place(*whole);
+  const bool follows_on = in_order && !is_old;
   // Before the first complete values there is nothing that a sample could belong to.
-  if (!follows_on && source.commit == 0) return false;
-  if (follows_on) source.commit = whole->commit;
+  if (!source.received.answered()) return false;
   std::vector<PushedValue> values;
   for (PushedValue& entry : whole->entries) {
     if (auto value = admitted(source, std::move(entry), follows_on)) {
@@ -167,19 +164,18 @@ bool WatchMirror::take(const PushedValues& pushed) {
 
 bool WatchMirror::complete() const {
   return std::all_of(sources_.begin(), sources_.end(),
-                     [](const Source& source) { return source.commit != 0; });
+                     [](const Source& source) { return source.received.answered(); });
 }
 
 bool WatchMirror::lacks() const {
-  return std::any_of(sources_.begin(), sources_.end(), [](const Source& source) {
-    return source.commit == 0 || source.heard > source.commit;
-  });
+  return std::any_of(sources_.begin(), sources_.end(),
+                     [](const Source& source) { return source.received.lacks(); });
 }
 
 bool WatchMirror::is_behind(const WatchMirror& other) const {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const Source* like = other.source_like(route_.sources[i]);
-    if (like != nullptr && sources_[i].commit < std::max(like->commit, like->heard)) return true;
+    if (like != nullptr && sources_[i].received.is_behind(like->received)) return true;
   }
   return false;
 }

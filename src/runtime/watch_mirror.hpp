@@ -101,10 +101,7 @@ class WatchMirror {
   };
   struct Source {
     std::vector<std::uint32_t> edges;  // by the entries' indices
-    PushedPieces pieces;
-    KnownCovariances covariances{0};
-    std::uint64_t commit = 0;  // of the owner: complete up to this commit; 0: nothing yet
-    std::uint64_t heard = 0;   // the newest commit of which anything has come
+    ReceivedGroup received;
   };
 
   /// The entry to apply, unless it is old or must wait.

@@ -5,6 +5,9 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
+#include "runtime/context.hpp"
+#include "runtime/member_runner.hpp"
+#include "runtime/requests.hpp"
 #include "tree/epoch.hpp"
 
 namespace tfdude {
@@ -32,15 +35,19 @@ bool wants_newest(const Query& query) {
 
 }  // namespace
 
-WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options)
+WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options,
+                         std::shared_ptr<Callbacks::Line> routes)
     : a_(std::move(a)),
       b_(std::move(b)),
       options_(std::move(options)),
+      routes_(std::move(routes)),
       why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
 
-WatchedPath::WatchedPath(std::vector<std::string> frames, WatchOptions options)
+WatchedPath::WatchedPath(std::vector<std::string> frames, WatchOptions options,
+                         std::shared_ptr<Callbacks::Line> routes)
     : frames_(std::move(frames)),
       options_(std::move(options)),
+      routes_(std::move(routes)),
       why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
 
 WatchedPath::~WatchedPath() = default;
@@ -135,9 +142,10 @@ bool WatchedPath::prepare(WatchRoute route) {
   return shown;
 }
 
-WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
-  Taken taken;
+bool WatchedPath::take(const PushedValues& pushed) {
   bool is_new = false;
+  bool rerouted = false;
+  bool lacks = false;
   {
     const Lock lock(mutex_);
     if (followed_ != nullptr && followed_->has(pushed.group)) {
@@ -145,13 +153,14 @@ WatchedPath::Taken WatchedPath::take(const PushedValues& pushed) {
       remember_newest();
     }
     if (next_ != nullptr && next_->take(pushed)) is_new = true;
-    taken.rerouted = swap_if_ready();
+    rerouted = swap_if_ready();
     const auto& latest = next_ != nullptr ? next_ : followed_;
-    taken.lacks = latest != nullptr && latest->lacks();
+    lacks = latest != nullptr && latest->lacks();
     if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
   }
   tell();  // late samples are not new to show, but may be waited for
-  return taken;
+  if (rerouted) report_rerouted();
+  return lacks;
 }
 
 void WatchedPath::remember_newest() {
@@ -230,12 +239,7 @@ std::optional<Time> WatchedPath::lacks_history() {
   return from;
 }
 
-std::size_t WatchedPath::edge_count() const {
-  const Lock lock(mutex_);
-  return followed_ != nullptr ? followed_->route().edges.size() : 0;
-}
-
-std::set<std::uint64_t> WatchedPath::groups() const {
+std::set<std::uint64_t> WatchedPath::groups(Clock::time_point /*now*/) {
   const Lock lock(mutex_);
   std::set<std::uint64_t> groups;
   for (const auto* mirror : {followed_.get(), next_.get()}) {
@@ -245,7 +249,86 @@ std::set<std::uint64_t> WatchedPath::groups() const {
   return groups;
 }
 
-std::shared_ptr<void> WatchedPath::on_news(std::function<void()> listener) {
+// ---- rounds
+
+Result<WatchRoute> WatchedPath::route(const Context& context) const {
+  const std::uint64_t own_incarnation = context.member.incarnation();
+  // If nobody can say whether the route is still right, the known one must do.
+  const auto names = frames_.empty() ? std::vector<std::string>{a_, b_} : frames_;
+  const auto known =
+      context.requests.know(names, OnDemand::kFresh, Deadline(context.options.timeout));
+  const auto period = watch_period(options_.rate);
+  Structure& structure = context.structure;
+  const Lock lock(structure.mutex);
+  auto route = frames_.empty() ? watch_route(structure.forest, structure.directory, a_, b_,
+                                             options_.composed, period, own_incarnation)
+                               : watch_route(structure.forest, structure.directory, frames_, period,
+                                             own_incarnation);
+  if (!route && !known) return tl::unexpected(known.error());
+  return route;
+}
+
+Result<Watched::Plan> WatchedPath::plan(const Context& context) {
+  collect();
+  auto route = this->route(context);
+  if (!route) return tl::unexpected(std::move(route.error()));
+  planned();
+  Plan plan{{}, !follows(*route)};
+  for (std::size_t i = 0; i < route->parts.size(); ++i) {
+    plan.groups.push_back({route->sources[i].group, route->parts[i]});
+  }
+  if (plan.is_new && prepare(*std::move(route))) report_rerouted();
+  return plan;
+}
+
+bool WatchedPath::on_no_plan(Error why) {
+  const bool was_live = live();
+  if (was_live && !is_gone(why, Clock::now())) {
+    // Known values are still returned, with their stamps; the owner may return.
+    const bool may_return = why.code == Errc::kUnreachable;
+    set_health(tl::unexpected(std::move(why)));
+    return may_return;
+  }
+  if (was_live) report(why.message);
+  interrupt(std::move(why));
+  return false;
+}
+
+bool WatchedPath::on_deaf(Error why) {
+  set_health(tl::unexpected(std::move(why)));
+  return false;
+}
+
+bool WatchedPath::on_denied(const Part& part, const Error* why) {
+  if (live()) return false;
+  interrupt(why != nullptr ? *why
+                           : Error{Errc::kNotOwner, "partition " + quote(part.partition) +
+                                                        " has restarted, or cannot push"});
+  return false;
+}
+
+void WatchedPath::end() {
+  interrupt({Errc::kTransport, "the client of this watched path has ended"});
+}
+
+void WatchedPath::report(std::string what) {
+  if (routes_ == nullptr || !options_.on_route) return;
+  routes_->post(
+      [path = shared_from_this(), what = std::move(what)] { path->options_.on_route(what); });
+}
+
+void WatchedPath::report_rerouted() {
+  std::size_t edges = 0;
+  {
+    const Lock lock(mutex_);
+    if (followed_ != nullptr) edges = followed_->route().edges.size();
+  }
+  report("the " + described() + " has a new route, over " + std::to_string(edges) + " edges");
+}
+
+// ---- waiting
+
+std::shared_ptr<void> WatchedPath::on_news(Listener listener) {
   const Lock lock(listeners_->mutex);
   const auto mine = listeners_->all.insert(listeners_->all.end(), std::move(listener));
   return {nullptr, [listeners = listeners_, mine](void*) {

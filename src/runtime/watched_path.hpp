@@ -16,7 +16,9 @@
 #include "tfdude/types/options.hpp"
 
 #include "base/mutex.hpp"
+#include "runtime/callbacks.hpp"
 #include "runtime/watch_mirror.hpp"
+#include "runtime/watched.hpp"
 
 namespace tfdude {
 
@@ -25,15 +27,18 @@ namespace tfdude {
 /// is shown once it has all values; readers of the previous one keep it until they are done
 /// (epoch.hpp). While the shown mirror has no instant
 /// that all its edges have, its last transform is shown instead.
-class WatchedPath {
+class WatchedPath final : public Watched, public std::enable_shared_from_this<WatchedPath> {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Listener = std::function<void()>;
 
-  WatchedPath(std::string a, std::string b, WatchOptions options);
+  /// @param routes  calls WatchOptions::on_route
+  WatchedPath(std::string a, std::string b, WatchOptions options,
+              std::shared_ptr<Callbacks::Line> routes = nullptr);
   /// The edges of these frames. lookup(Query) then has no result, and there is no common instant to
   /// wait for.
-  WatchedPath(std::vector<std::string> frames, WatchOptions options);
-  ~WatchedPath();
+  WatchedPath(std::vector<std::string> frames, WatchOptions options,
+              std::shared_ptr<Callbacks::Line> routes = nullptr);
+  ~WatchedPath() override;
   WatchedPath(const WatchedPath&) = delete;
   WatchedPath& operator=(const WatchedPath&) = delete;
 
@@ -46,14 +51,12 @@ class WatchedPath {
   /// not followed.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query) const;
-  /// Whether the pushed values suffice for this query.
-  [[nodiscard]] bool has_data(const Query& query) const;
 
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;
   /// See PathWatch::on_news(). @return keeps the listener; it may outlive this object
-  [[nodiscard]] std::shared_ptr<void> on_news(std::function<void()> listener);
+  [[nodiscard]] std::shared_ptr<void> on_news(Listener listener);
   /// Waits until the path is followed and its dynamic edges have a common instant; lack of the
   /// latter is no error.
   /// @return why it is not followed, at the deadline
@@ -65,15 +68,29 @@ class WatchedPath {
   [[nodiscard]] const WatchOptions& options() const { return options_; }
   /// For messages: "path from 'a' to 'b'".
   [[nodiscard]] std::string described() const;
+  /// The current route. @return as Client::lookup()
+  [[nodiscard]] Result<WatchRoute> route(const Context& context) const;
 
-  /// The result of applying pushed values.
-  struct Taken {
-    bool rerouted = false;  ///< another route is shown now
-    bool lacks = false;     ///< missing values must be requested
-  };
-  Taken take(const PushedValues& pushed);
+  bool take(const PushedValues& pushed) override;
+  void end() override;
+  [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
+                                const Query& query) const override {
+    return a_ == a && b_ == b && has_data(query);
+  }
 
-  // --- for Watches, from one thread ---
+  // --- for the rounds, from one thread ---
+
+  [[nodiscard]] Result<Plan> plan(const Context& context) override;
+  bool on_no_plan(Error why) override;
+  bool on_deaf(Error why) override;
+  bool on_denied(const Part& part, const Error* why) override;
+  /// An owner that has returned has to send its values first: until then old ones are shown.
+  void on_complete() override { set_health({}); }
+  [[nodiscard]] bool lacks(Clock::time_point /*now*/) const override { return !up_to_date(); }
+  [[nodiscard]] std::optional<Time> lacks_from() override { return lacks_history(); }
+  [[nodiscard]] std::optional<Time> lacks_earlier() override { return lacks_history(); }
+  [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
+  [[nodiscard]] unsigned periods() const override { return 1; }
 
   [[nodiscard]] bool live() const { return shown_.load(std::memory_order_acquire) != nullptr; }
   /// Whether the path uses this route, or is about to.
@@ -91,24 +108,25 @@ class WatchedPath {
   [[nodiscard]] bool is_gone(const Error& error, Clock::time_point now);
   /// It exists: is_gone() begins to count again.
   void planned();
-  /// Sets whether all owners are reachable, and have sent their values since.
-  void set_health(Result<void> health);
-  [[nodiscard]] std::size_t edge_count() const;
-  /// The groups whose values it needs.
-  [[nodiscard]] std::set<std::uint64_t> groups() const;
   /// Frees mirrors that have no readers any more.
   void collect();
 
  private:
   struct Listeners {
     Mutex mutex;
-    std::list<std::function<void()>> all TFDUDE_GUARDED_BY(mutex);
+    std::list<Listener> all TFDUDE_GUARDED_BY(mutex);
   };
   struct Retired {
     std::uint64_t tag;
     std::shared_ptr<const void> object;
   };
 
+  /// Whether the pushed values suffice for this query.
+  [[nodiscard]] bool has_data(const Query& query) const;
+  /// Sets whether all owners are reachable, and have sent their values since.
+  void set_health(Result<void> health);
+  void report(std::string what);
+  void report_rerouted();
   [[nodiscard]] bool swap_if_ready() TFDUDE_REQUIRES(mutex_);
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
   /// Tells all who wait that something is new.
@@ -121,6 +139,7 @@ class WatchedPath {
   const std::string b_;
   const std::vector<std::string> frames_;  // instead of a path
   const WatchOptions options_;
+  const std::shared_ptr<Callbacks::Line> routes_;
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 
 namespace tfdude {
 
@@ -15,8 +15,11 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe.
 class Writes {
  public:
-  Writes(Structure& structure, Discovery& discovery, Requests& requests, MemberRunner& member)
-      : structure_(structure), discovery_(discovery), requests_(requests), member_(member) {}
+  explicit Writes(const Context& context)
+      : structure_(context.structure),
+        discovery_(context.discovery),
+        requests_(context.requests),
+        member_(context.member) {}
 
   [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request,
                                  const std::string& partition);

@@ -11,7 +11,7 @@
 
 namespace tfdude::simulation {
 
-/// The owner's side of watched paths, as Pusher does it, in steps.
+/// The owner's side of watched paths, as PushLoop does it, in steps.
 class Pushes {
  public:
   using Push = std::function<void(const PushedValues&)>;

@@ -23,32 +23,42 @@ class Link final : public Channel<Message> {
   const std::string to_;
 };
 
-/// @param route_of  of the edge or joint of this name
 template <class Message, class RouteOf>
-SenderLinks<Message> links_of(Process& process, RouteOf route_of) {
-  SenderLinks<Message> links;
-  links.find = [&process, route_of](const std::vector<std::string>& names) {
+class Links final : public SenderLinks<Message> {
+ public:
+  /// @param route_of  of the edge or joint of this name
+  Links(Process& process, RouteOf route_of) : process_(process), route_of_(std::move(route_of)) {}
+
+  std::vector<Destinations> find(const std::vector<std::string>& names) override {
     std::vector<Destinations> found(names.size());
     for (std::size_t i = 0; i < names.size(); ++i) {
-      const Result<Directory::JointRoute> route = route_of(names[i]);
+      const Result<Directory::JointRoute> route = route_of_(names[i]);
       if (!route) {
         found[i].none = route.error().code;
         continue;
       }
       found[i].name = route->name;
       for (const Owner owner : route->owners) {
-        const Directory& directory = process.directory();
+        const Directory& directory = process_.directory();
         found[i].to.push_back({owner, directory.name(owner), directory.reachable(owner)});
       }
     }
     return found;
-  };
-  links.connect = [&process](const std::string& to) {
-    return std::make_unique<Link<Message>>(process, to);
-  };
-  links.apply_here = [](const Message&) { return Result<void>(); };
-  links.out = [] { return false; };
-  return links;
+  }
+  std::unique_ptr<Channel<Message>> connect(const std::string& to) override {
+    return std::make_unique<Link<Message>>(process_, to);
+  }
+  Result<void> apply_here(const Message&) override { return {}; }
+  bool out() const override { return false; }
+
+ private:
+  Process& process_;
+  const RouteOf route_of_;
+};
+
+template <class Message, class RouteOf>
+std::shared_ptr<SenderLinks<Message>> links_of(Process& process, RouteOf route_of) {
+  return std::make_shared<Links<Message, RouteOf>>(process, std::move(route_of));
 }
 
 }  // namespace

@@ -19,10 +19,11 @@ namespace tfdude::simulation {
 template <class Message>
 class Stream : public Planned, public std::enable_shared_from_this<Stream<Message>> {
  public:
-  Stream(Process& process, std::vector<std::string> names, SenderLinks<Message> links)
+  Stream(Process& process, std::vector<std::string> names,
+         std::shared_ptr<SenderLinks<Message>> links)
       : process_(process),
         names_(std::move(names)),
-        find_(links.find),
+        links_(links),
         sender_(std::make_shared<Sender<Message>>(names_, std::move(links))) {}
 
   void start() {
@@ -42,7 +43,7 @@ class Stream : public Planned, public std::enable_shared_from_this<Stream<Messag
  private:
   [[nodiscard]] std::string plan() const override {
     std::string text;
-    for (const Destinations& owners : find_(names_)) {
+    for (const Destinations& owners : links_->find(names_)) {
       text += text.empty() ? "" : ", ";
       for (const Destination& one : owners.to)
         text += one.partition + (one.reachable ? " " : " (gone) ");
@@ -57,7 +58,7 @@ class Stream : public Planned, public std::enable_shared_from_this<Stream<Messag
 
   Process& process_;
   const std::vector<std::string> names_;
-  const std::function<std::vector<Destinations>(const std::vector<std::string>&)> find_;
+  const std::shared_ptr<SenderLinks<Message>> links_;
   std::shared_ptr<Sender<Message>> sender_;
 };
 

@@ -16,7 +16,7 @@ namespace tfdude::simulation {
 
 class Process;
 
-/// A watched path of a client, maintained in steps as Watches does it.
+/// A watched path of a client, maintained in steps as WatchLoop does it.
 class Watch : public std::enable_shared_from_this<Watch> {
  public:
   /// @param shown  called when its value may have changed
@@ -30,7 +30,7 @@ class Watch : public std::enable_shared_from_this<Watch> {
   [[nodiscard]] Result<StampedTransform> read() const { return path_.lookup({}); }
 
   /// The groups whose values it needs.
-  [[nodiscard]] std::set<std::uint64_t> groups() const { return path_.groups(); }
+  [[nodiscard]] std::set<std::uint64_t> groups() { return path_.groups({}); }
 
   // ---- input from the process
   void on_reply(const Reply& reply);

@@ -12,10 +12,9 @@
 #include "tfdude/client/node.hpp"
 #include "tfdude/transport/loopback.hpp"
 
-#include "runtime/discovery.hpp"
+#include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
-#include "runtime/structure.hpp"
 #include "support/catch.hpp"
 #include "support/relay.hpp"
 
@@ -38,18 +37,8 @@ class Rig {
         structure(with.clock, partition),
         transport(std::move(to)),
         discovery(structure, *transport, options.discovery, options.timeout),
-        member(structure, *transport, partition,
-               {[this] { ++routes; },
-                [this](const std::string& name) {
-                  {
-                    const std::lock_guard lock(mutex);
-                    gone.push_back(name);
-                  }
-                  requests.calls().on_lost(name);
-                },
-                [this] {
-                  if (on_contest) on_contest();
-                }}),
+        context{options, structure, *transport, discovery, member, requests, threads},
+        member(context, partition, heed_),
         requests(structure, discovery, *transport,
                  {[this](const Request& request) { return member.answer(request); },
                   [this](const tfdude::Deadline& deadline) { member.tell(deadline); },
@@ -61,6 +50,7 @@ class Rig {
   }
   virtual ~Rig() {
     member.stop_events();
+    threads.callbacks.stop();
     member.stop();
     transport->stop();
   }
@@ -82,9 +72,31 @@ class Rig {
   std::atomic<int> routes{0};
   std::mutex mutex;
   std::vector<std::string> gone;  // partitions; under mutex
+  class Heed final : public MemberRunner::Listeners {
+   public:
+    explicit Heed(Rig& rig) : rig_(rig) {}
+
+    void on_routes() override { ++rig_.routes; }
+    void on_gone(const std::string& name) override {
+      {
+        const std::lock_guard lock(rig_.mutex);
+        rig_.gone.push_back(name);
+      }
+      rig_.requests.calls().on_lost(name);
+    }
+    void on_contest() override {
+      if (rig_.on_contest) rig_.on_contest();
+    }
+
+   private:
+    Rig& rig_;
+  };
+  Heed heed_{*this};
   Structure structure;
   TransportPtr transport;
+  Threads threads;
   Discovery discovery;
+  const Context context;
   MemberRunner member;
   Requests requests;
 

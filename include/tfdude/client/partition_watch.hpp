@@ -8,7 +8,7 @@
 
 namespace tfdude {
 
-class FollowedPartition;
+class WatchedPartition;
 
 /// How to watch a partition.
 struct PartitionWatchOptions {
@@ -28,7 +28,7 @@ struct PartitionWatchOptions {
 /// that call itself does it, and no other follows.
 class TFDUDE_EXPORT PartitionWatch {
  public:
-  explicit PartitionWatch(std::shared_ptr<FollowedPartition> partition);
+  explicit PartitionWatch(std::shared_ptr<WatchedPartition> partition);
   PartitionWatch(const PartitionWatch&) = delete;
   PartitionWatch& operator=(const PartitionWatch&) = delete;
   PartitionWatch(PartitionWatch&&) noexcept;
@@ -36,7 +36,7 @@ class TFDUDE_EXPORT PartitionWatch {
   ~PartitionWatch();
 
  private:
-  std::shared_ptr<FollowedPartition> partition_;
+  std::shared_ptr<WatchedPartition> partition_;
 };
 
 }  // namespace tfdude

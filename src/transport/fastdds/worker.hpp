@@ -1,11 +1,11 @@
 #pragma once
 
-#include <algorithm>
 #include <chrono>
 #include <deque>
 #include <functional>
-#include <thread>
+#include <utility>
 
+#include "base/loop.hpp"
 #include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
@@ -14,8 +14,9 @@ namespace tfdude::fastdds {
 /// and for periodic work.
 class Worker {
  public:
-  Worker() : thread_([this] { run(); }) {}
-  ~Worker() { stop(); }
+  Worker()
+      : next_(loop_, [this] { return run_next(); }),
+        again_(loop_, [this] { return run_again(); }) {}
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
@@ -24,72 +25,52 @@ class Worker {
       const Lock lock(mutex_);
       jobs_.push_back(std::move(job));
     }
-    changed_.notify_one();
+    next_.ask();
   }
 
   /// Runs a job periodically from now on, between other jobs. It returns the time until it is due
   /// again. There can be only one such job.
   void repeat(std::function<std::chrono::milliseconds()> job) {
-    const Lock lock(mutex_);
-    repeated_ = std::move(job);
-    due_ = Clock::now();
-    changed_.notify_one();
+    {
+      const Lock lock(mutex_);
+      repeated_ = std::move(job);
+    }
+    again_.ask();
   }
 
   /// The repeated job is due again in this time at the latest. Does not allocate.
-  void hurry(std::chrono::milliseconds time) {
-    const Lock lock(mutex_);
-    const auto due = Clock::now() + time;
-    if (due >= due_) return;
-    due_ = due;
-    changed_.notify_one();
-  }
+  void hurry(std::chrono::milliseconds time) { again_.ask_by(Loop::Clock::now() + time); }
 
   /// Finishes the current job and drops the others.
-  void stop() {
-    {
-      const Lock lock(mutex_);
-      stopping_ = true;
-    }
-    changed_.notify_one();
-    if (thread_.joinable()) thread_.join();
-  }
+  void stop() { loop_.stop(); }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
-  void run() {
-    Lock lock(mutex_);
-    while (true) {
-      // By a copy, which others may not change while it is waited for. Who changes it notifies.
-      const Clock::time_point due = due_;
-      changed_.wait_until(lock, due, [this, due]() TFDUDE_REQUIRES(mutex_) {
-        return stopping_ || !jobs_.empty() || due_ != due;
-      });
-      if (stopping_) return;
-      if (!jobs_.empty()) {
-        const std::function<void()> job = std::move(jobs_.front());
-        jobs_.pop_front();
-        lock.unlock();
-        job();
-        lock.lock();
-      }
-      if (!repeated_ || Clock::now() < due_) continue;
-      due_ = Clock::time_point::max();  // what hurries meanwhile is kept
-      lock.unlock();
-      const auto next = Clock::now() + repeated_();
-      lock.lock();
-      due_ = std::min(due_, next);
+  Loop::Clock::time_point run_next() {
+    std::function<void()> job;
+    {
+      const Lock lock(mutex_);
+      if (jobs_.empty()) return Loop::kNever;
+      job = std::move(jobs_.front());
+      jobs_.pop_front();
     }
+    job();
+    return Loop::Clock::time_point::min();
+  }
+
+  Loop::Clock::time_point run_again() {
+    {
+      const Lock lock(mutex_);
+      if (!repeated_) return Loop::kNever;
+    }
+    return Loop::Clock::now() + repeated_();
   }
 
   Mutex mutex_;
-  Condition changed_;
   std::deque<std::function<void()>> jobs_ TFDUDE_GUARDED_BY(mutex_);
-  bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
-  std::function<std::chrono::milliseconds()> repeated_;  // set once, before it is due
-  Clock::time_point due_ TFDUDE_GUARDED_BY(mutex_) = Clock::now() + std::chrono::hours(1);
-  std::thread thread_;
+  std::function<std::chrono::milliseconds()> repeated_;  // set once, under the mutex
+  Loop loop_{"tfdude-dds"};
+  Loop::Job next_;
+  Loop::Job again_;
 };
 
 }  // namespace tfdude::fastdds

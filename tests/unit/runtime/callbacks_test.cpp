@@ -15,21 +15,17 @@ namespace {
 
 using testing::eventually;
 
-/// Looks after the callbacks until the condition holds, as the thread that posts must.
-bool looked_after(Callbacks& callbacks, const std::function<bool()>& done) {
-  return eventually([&] {
-    (void)callbacks.look_after(Callbacks::Clock::now());
-    return done();
-  });
-}
+/// Posts a call that belongs to no other.
+void post(Callbacks& callbacks, Callbacks::Call call) { callbacks.line()->post(std::move(call)); }
 
 TEST_CASE("callbacks: many quick callbacks run in order on one thread") {
-  Callbacks callbacks;
+  Loop loop{"test"};
+  Callbacks callbacks(loop);
   std::mutex mutex;
   std::vector<int> order;
   std::set<std::thread::id> threads;
   for (int i = 0; i < 1000; ++i) {
-    callbacks.post([&, i] {
+    post(callbacks, [&, i] {
       const std::lock_guard lock(mutex);
       order.push_back(i);
       threads.insert(std::this_thread::get_id());
@@ -41,26 +37,26 @@ TEST_CASE("callbacks: many quick callbacks run in order on one thread") {
   }));
   CHECK(std::is_sorted(order.begin(), order.end()));
   CHECK(threads.size() == 1);
-  CHECK_FALSE(callbacks.look_after(Callbacks::Clock::now()));
 }
 
 TEST_CASE("callbacks: slow callbacks do not keep others from running") {
-  Callbacks callbacks;
+  Loop loop{"test"};
+  Callbacks callbacks(loop);
   std::promise<void> held;
   const auto until = held.get_future().share();
   std::atomic<int> begun{0};
   std::atomic<int> ended{0};
   constexpr int kSlow = 5;
   for (int i = 0; i < kSlow; ++i) {
-    callbacks.post([&] {
+    post(callbacks, [&] {
       ++begun;
       until.wait();
       ++ended;
     });
   }
   std::atomic<bool> quick{false};
-  callbacks.post([&] { quick = true; });
-  CHECK(looked_after(callbacks, [&] { return quick.load(); }));
+  post(callbacks, [&] { quick = true; });
+  CHECK(eventually([&] { return quick.load(); }));
   CHECK(begun == kSlow);
   CHECK(ended == 0);
   held.set_value();
@@ -69,18 +65,19 @@ TEST_CASE("callbacks: slow callbacks do not keep others from running") {
 }
 
 TEST_CASE("callbacks: after the end no callback runs and waiting ones are dropped") {
-  Callbacks callbacks;
+  Loop loop{"test"};
+  Callbacks callbacks(loop);
   std::promise<void> begun;
   std::promise<void> held;
   std::atomic<bool> ended{false};
-  callbacks.post([&] {
+  post(callbacks, [&] {
     begun.set_value();
     held.get_future().wait();
     ended = true;
   });
   std::atomic<int> others{0};
   const auto counted = std::make_shared<int>(0);
-  callbacks.post([&others, counted] { ++others; });
+  post(callbacks, [&others, counted] { ++others; });
   begun.get_future().wait();
   std::atomic<bool> stopped{false};
   std::thread stopping([&] {
@@ -93,15 +90,16 @@ TEST_CASE("callbacks: after the end no callback runs and waiting ones are droppe
   stopping.join();
   CHECK(ended);
   CHECK(others == 0);
-  callbacks.post([&] { ++others; });
+  post(callbacks, [&] { ++others; });
   CHECK(others == 0);
 }
 
 TEST_CASE("callbacks: a callback may destroy the queue that runs it") {
-  auto callbacks = std::make_unique<Callbacks>();
+  Loop loop{"test"};
+  auto callbacks = std::make_unique<Callbacks>(loop);
   std::promise<void> done;
   std::promise<void> ready;
-  callbacks->post([&] {
+  post(*callbacks, [&] {
     ready.get_future().wait();
     callbacks.reset();
     done.set_value();

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "runtime/context.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude {
@@ -52,7 +53,8 @@ class Heard {
 TEST_CASE("events: each listener gets each change in order from when it subscribes") {
   Heard first;
   Heard second;
-  Events events;
+  Threads threads;
+  Events events(threads.callbacks);
   (void)events.subscribe(first.callback());
   events.post({change("a"), change("b")});
   REQUIRE(first.hears(2));
@@ -66,7 +68,8 @@ TEST_CASE("events: each listener gets each change in order from when it subscrib
 
 TEST_CASE("events: unsubscribing waits for the listener that runs and ends all calls to it") {
   Heard heard;
-  Events events;
+  Threads threads;
+  Events events(threads.callbacks);
   const auto subscriber = events.subscribe(heard.callback());
   heard.hold(true);
   events.post({change("a"), change("b")});
@@ -88,7 +91,8 @@ TEST_CASE("events: unsubscribing waits for the listener that runs and ends all c
 }
 
 TEST_CASE("events: a listener may end its own subscription") {
-  Events events;
+  Threads threads;
+  Events events(threads.callbacks);
   std::uint64_t self = 0;
   std::atomic<int> calls{0};
   Heard other;
@@ -104,7 +108,8 @@ TEST_CASE("events: a listener may end its own subscription") {
 
 TEST_CASE("events: a listener is told the number of changes that were dropped") {
   Heard heard;
-  Events events;
+  Threads threads;
+  Events events(threads.callbacks);
   (void)events.subscribe(heard.callback());
   heard.hold(true);
   events.post({change("first")});

@@ -24,7 +24,7 @@ using testing::ScriptedOwner;
 
 struct Mover : Rig {
   explicit Mover(LoopbackNetwork& network, const std::string& partition = "")
-      : Rig(network.join(), partition), calls(structure, discovery, requests, member) {}
+      : Rig(network.join(), partition), calls(context) {}
   JointCalls calls;
 };
 

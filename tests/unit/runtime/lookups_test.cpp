@@ -23,16 +23,12 @@ using testing::x_of;
 
 struct Seeker : Rig {
   explicit Seeker(LoopbackNetwork& network)
-      : Rig(network.join()),
-        watcher(
-            structure, discovery, requests, *transport, [] { return std::uint64_t{0}; },
-            options.timeout),
-        lookups(structure, discovery, requests, *transport, watcher, options.timeout) {}
+      : Rig(network.join()), watcher(context), lookups(context, watcher) {}
   ~Seeker() override {
     lookups.stop();
     watcher.stop();
   }
-  Watcher watcher;
+  WatchClient watcher;
   Lookups lookups;
 };
 

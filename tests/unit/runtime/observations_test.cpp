@@ -20,8 +20,7 @@ using testing::Rig;
 using testing::ScriptedOwner;
 
 struct Observer : Rig {
-  explicit Observer(LoopbackNetwork& network)
-      : Rig(network.join()), observations(structure, discovery, requests) {}
+  explicit Observer(LoopbackNetwork& network) : Rig(network.join()), observations(context) {}
 
   Result<Observed> observe(const Transform& X_AB) {
     return observations.observe("world", "hand", X_AB, std::nullopt, {}, deadline());

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -56,6 +59,17 @@ void work(Client& client, const std::string& name, std::uint64_t seed, std::stri
   }
 }
 
+// Of all threads of this process.
+std::multiset<std::string> thread_names() {
+  std::multiset<std::string> names;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::string name;
+    std::getline(std::ifstream(thread.path() / "comm"), name);
+    names.insert(name);
+  }
+  return names;
+}
+
 }  // namespace
 
 TEST_CASE("threads: owners with a store and clients agree after concurrent changes") {
@@ -96,6 +110,44 @@ TEST_CASE("threads: owners with a store and clients agree after concurrent chang
   }
   CHECK(wrong == std::vector<std::string>(kCallers + 1));
   CHECK(told > kCalls);
+}
+
+TEST_CASE("participant: it serves and watches and waits and listens on six named threads") {
+  LoopbackNetwork network;
+  const TemporaryDirectory directory;
+  Options options;
+  options.state = directory.path();
+  Node head = Node::open(network.join(), "head", {{"head", "", {}}, {"eye", "head", {}}}).value();
+  Node arm = Node::open(network.join(), "arm", {{"arm", "head", {}}, {"hand", "arm", {}}}, options)
+                 .value();
+  REQUIRE(eventually([&] { return thread_names().count("tfdude-commit") == 2; }));
+  const auto before = thread_names();
+  std::atomic<int> heard{0};
+  std::vector<PartitionWatch> watched;
+  PartitionWatchOptions news;
+  news.on_news = [&](const PartitionNews&) { ++heard; };
+  for (const char* name : {"arm", "head", "head"}) {
+    watched.push_back(arm.watch_partition(name, news).value());
+  }
+  const auto path = arm.watch("head", "hand");
+  REQUIRE(path);
+  const auto listening = arm.on_change([&](const Change&) { ++heard; });
+  const auto stream = arm.stream({"eye"});
+  REQUIRE(stream);
+  auto waiting = arm.lookup_async("head", "later", {}, Milliseconds::max());
+  REQUIRE(head.add("later", "head", {}));
+  REQUIRE(waiting.get());
+  REQUIRE(eventually([&] { return heard >= 6; }));
+  // Beside the transport's. The other one, whose edges are watched, pushes.
+  const std::multiset<std::string> expected{"tfdude-ask", "tfdude-callback", "tfdude-calls",
+                                            "tfdude-push", "tfdude-push"};
+  CHECK(eventually([&] {
+    auto begun = thread_names();
+    for (const std::string& name : before) {
+      if (const auto known = begun.find(name); known != begun.end()) begun.erase(known);
+    }
+    return begun == expected;
+  }));
 }
 
 }  // namespace tfdude

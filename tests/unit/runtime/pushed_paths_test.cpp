@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/pushing.hpp"
-#include "runtime/watcher.hpp"
+#include "runtime/watch_server.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/process.hpp"
@@ -25,15 +24,11 @@ using testing::ScriptedOwner;
 using testing::x_of;
 
 struct WatchingRig : Rig {
-  explicit WatchingRig(LoopbackNetwork& network)
-      : Rig(network.join()),
-        watcher(
-            structure, discovery, requests, *transport, [] { return std::uint64_t{0}; },
-            options.timeout) {
+  explicit WatchingRig(LoopbackNetwork& network) : Rig(network.join()), watcher(context) {
     pushed = [this](const PushedValues& values) { watcher.on_pushed(values); };
   }
   ~WatchingRig() override { watcher.stop(); }
-  Watcher watcher;
+  WatchClient watcher;
 };
 
 const std::vector<FrameSpec> kArm{{"arm", "", {}}, {"hand", "arm", along_x(4)}};
@@ -106,10 +101,8 @@ TEST_CASE("pushing: a watcher gets all values in the reply and later ones pushed
   LoopbackNetwork network;
   std::atomic<double> pushed{0};
   Rig owner(network.join(), "arm");
-  Watcher own(
-      owner.structure, owner.discovery, owner.requests, *owner.transport,
-      [] { return std::uint64_t{0}; }, 1s);
-  Pushing pushing(owner.structure, *owner.transport, owner.member, own, 1000);
+  WatchClient own(owner.context);
+  WatchServer pushing(owner.context, own);
   owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
   owner.member.open(nullptr, 1s);
   REQUIRE(owner.member.serve(nullptr, kArm));

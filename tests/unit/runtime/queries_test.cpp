@@ -19,8 +19,7 @@ using testing::Rig;
 using testing::ScriptedOwner;
 
 struct Asker : Rig {
-  explicit Asker(LoopbackNetwork& network)
-      : Rig(network.join()), queries(structure, discovery, requests, member, *transport) {}
+  explicit Asker(LoopbackNetwork& network) : Rig(network.join()), queries(context) {}
   Queries queries;
 };
 

@@ -35,16 +35,11 @@ using testing::ScriptedOwner;
 
 struct OwnerRig : Rig {
   explicit OwnerRig(TransportPtr to, const std::string& partition = "arm")
-      : Rig(std::move(to), partition),
-        yielding(structure, requests, member, options.timeout),
-        serving(structure, discovery, *transport, member, options) {
+      : Rig(std::move(to), partition), yielding(context), serving(context) {
     on_contest = [this] { yielding.ask(); };
   }
   ~OwnerRig() override { yielding.stop(); }
-  Result<void> serve(const std::vector<FrameSpec>& frames) {
-    yielding.start();
-    return serving.serve(frames);
-  }
+  Result<void> serve(const std::vector<FrameSpec>& frames) { return serving.serve(frames); }
   Yielding yielding;
   Serving serving;
 };

@@ -23,8 +23,7 @@ using testing::ScriptedOwner;
 using testing::x_of;
 
 struct Writer : Rig {
-  explicit Writer(LoopbackNetwork& network)
-      : Rig(network.join()), writes(structure, discovery, requests, member) {}
+  explicit Writer(LoopbackNetwork& network) : Rig(network.join()), writes(context) {}
   Writes writes;
 };
 
@@ -73,7 +72,7 @@ TEST_CASE("writes: reachable owners get their part while another is not discover
     Options options = testing::quick();
     options.timeout = 2000ms;
     Rig rig(std::make_unique<Unmet>(network.join(), never, start + 50ms), "", options);
-    Writes writes(rig.structure, rig.discovery, rig.requests, rig.member);
+    Writes writes(rig.context);
     REQUIRE(rig.discovery.await(rig.deadline()));
     Result<void> sent;
     std::thread sender([&] {

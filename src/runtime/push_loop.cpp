@@ -1,4 +1,4 @@
-#include "runtime/pusher.hpp"
+#include "runtime/push_loop.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -7,28 +7,26 @@
 
 namespace tfdude {
 
-Pusher::Pusher(Forest& forest, std::size_t max_groups, Push push, End end)
+PushLoop::PushLoop(Loop& loop, Forest& forest, std::size_t max_groups, Sink& sink)
     : forest_(forest),
       max_groups_(max_groups),
-      push_(std::move(push)),
-      end_(std::move(end)),
-      thread_([this] { run(); }) {}
+      sink_(sink),
+      pushes_(loop, [this] { return run(); }) {}
 
-void Pusher::stop() {
-  forest_.on_commit(nullptr);
+void PushLoop::stop() {
   {
     const Lock lock(mutex_);
-    stopping_ = true;
+    stopped_ = true;
+    forest_.on_commit(nullptr);
   }
-  changed_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  pushes_.stop();
 }
 
-Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& request) {
+Result<PushedValues> PushLoop::watch(std::uint64_t group, const WatchRequest& request) {
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   Result<PushedValues> snapshot;
   {
-    const Lock lock(groups_mutex_);
+    const Lock lock(mutex_);
     const bool first = groups_.empty();
     auto known = groups_.find(group);
     if (known == groups_.end()) {
@@ -46,39 +44,33 @@ Result<PushedValues> Pusher::watch(std::uint64_t group, const WatchRequest& requ
     } else {
       known->second.lease = Clock::now() + kWatchLease;
     }
-    if (first && !groups_.empty()) forest_.on_commit([this] { ask(); });
+    if (first && !groups_.empty() && !stopped_) forest_.on_commit([this] { pushes_.ask(); });
   }
-  ask();
+  pushes_.ask();
   return snapshot;
 }
 
-void Pusher::tell_all(std::uint64_t group) {
+void PushLoop::tell_all(std::uint64_t group) {
   {
-    const Lock lock(groups_mutex_);
+    const Lock lock(mutex_);
     const auto known = groups_.find(group);
     if (known == groups_.end()) return;
     known->second.all = true;
   }
-  ask();
+  pushes_.ask();
 }
 
 // The thread reports the end, as it may still be pushing to the group.
-void Pusher::end(std::map<std::uint64_t, Group>::iterator& group) {
+void PushLoop::end(std::map<std::uint64_t, Group>::iterator& group) {
   ended_.push_back(group->first);
   group = groups_.erase(group);
 }
 
-void Pusher::ask() {
-  if (asked_.exchange(true)) return;
-  // The lock prevents a notification between the thread's check and its sleep.
-  { const Lock lock(mutex_); }
-  changed_.notify_one();
-}
-
-std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
-                                           std::optional<Clock::time_point>& next) {
+std::vector<PushedValues> PushLoop::take_due(Clock::time_point now,
+                                             std::vector<std::uint64_t>& ended,
+                                             Clock::time_point& next) {
   std::vector<PushedValues> due;
-  const Lock lock(groups_mutex_);
+  const Lock lock(mutex_);
   for (auto group = groups_.begin(); group != groups_.end();) {
     if (now >= group->second.lease) {
       end(group);
@@ -94,7 +86,7 @@ std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<st
         one.due = std::max(one.due + period, now - period);
       }
     } else {
-      next = next ? std::min(*next, one.due) : one.due;
+      next = std::min(next, one.due);
     }
     if (std::exchange(one.all, false)) {
       if (auto pushed = one.watched.snapshot(forest_, {})) due.push_back(*std::move(pushed));
@@ -109,34 +101,19 @@ std::vector<PushedValues> Pusher::take_due(Clock::time_point now, std::vector<st
     forest_.on_commit(nullptr);
   } else {
     // To end groups that are not renewed.
-    const auto look = now + std::chrono::seconds(1);
-    next = next ? std::min(*next, look) : look;
+    next = std::min<Clock::time_point>(next, now + std::chrono::seconds(1));
   }
   return due;
 }
 
-void Pusher::run() {
-  std::optional<Clock::time_point> next;
-  Lock lock(mutex_);
-  while (true) {
-    const auto woken = [this]() TFDUDE_REQUIRES(mutex_) { return stopping_ || asked_.load(); };
-    if (next) {
-      changed_.wait_until(lock, *next, woken);
-    } else {
-      changed_.wait(lock, woken);
-    }
-    if (stopping_) return;
-    lock.unlock();
-    // Before the check, so that writes meanwhile are not missed.
-    asked_.store(false);
-    next.reset();
-    std::vector<std::uint64_t> ended;
-    for (PushedValues& pushed : take_due(Clock::now(), ended, next)) {
-      for (const PushedValues& piece : pieces_of(std::move(pushed))) push_(piece);
-    }
-    for (const std::uint64_t group : ended) end_(group);
-    lock.lock();
+PushLoop::Clock::time_point PushLoop::run() {
+  auto next = Loop::kNever;
+  std::vector<std::uint64_t> ended;
+  for (PushedValues& pushed : take_due(Clock::now(), ended, next)) {
+    for (const PushedValues& piece : pieces_of(std::move(pushed))) sink_.push(piece);
   }
+  for (const std::uint64_t group : ended) sink_.end(group);
+  return next;
 }
 
 }  // namespace tfdude

@@ -1,10 +1,14 @@
-#include "runtime/followed_partition.hpp"
+#include "runtime/watched_partition.hpp"
 
 #include <algorithm>
 #include <map>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+
+#include "partition/routing.hpp"
+#include "runtime/context.hpp"
+#include "runtime/member_runner.hpp"
 
 namespace tfdude {
 namespace {
@@ -13,9 +17,6 @@ constexpr std::uint32_t kGone = UINT32_MAX;
 
 // Edges that were written within this time of the newest sample are those that are streamed.
 constexpr std::chrono::seconds kStreamed{1};
-
-// Who wants every sample can wait a moment for several, which wake a thread once.
-constexpr Milliseconds kGather{5};
 
 // Gives each value of an edge the correlation that its last one has.
 void spread_correlations(std::vector<PushedValue>& entries) {
@@ -42,66 +43,90 @@ std::vector<std::uint32_t> places(const std::vector<WatchedFrame>& from,
 
 }  // namespace
 
-Result<PartitionPlan> plan_partition(const Forest& forest, const Directory& directory,
-                                     const std::string& partition, std::chrono::nanoseconds period,
-                                     std::uint64_t own_incarnation, std::size_t most) {
-  const auto owner = directory.owner(partition);
-  if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-  auto ready = route_to(directory, *owner, {});
-  if (!ready) return tl::unexpected(std::move(ready.error()));
-  PartitionPlan plan;
-  const auto serving = directory.serving(partition);
-  plan.incarnation = *owner == kHeldHere ? own_incarnation : serving ? serving->incarnation : 0;
-  for (FrameInfo& frame : forest.frames()) {
-    if (frame.owner == *owner)
-      plan.frames.push_back({std::move(frame.id), std::move(frame.parent)});
-  }
-  std::sort(plan.frames.begin(), plan.frames.end(),
-            [](const WatchedFrame& a, const WatchedFrame& b) { return a.id < b.id; });
-  for (std::uint32_t i = 0; i < plan.frames.size(); ++i) {
-    const WatchedFrame& frame = plan.frames[i];
-    if (frame.parent.empty()) continue;
-    if (plan.groups.empty() || plan.groups.back().frames.size() == most) {
-      WatchRequest request;
-      request.period = period;
-      plan.groups.push_back({0, {}, {*owner, partition, Request{0, frame.id, request}}});
+WatchedPartition::WatchedPartition(std::string name, double rate, Listener listener,
+                                   std::shared_ptr<Callbacks::Line> line)
+    : name_(std::move(name)),
+      period_(watch_period(rate)),
+      listener_(std::make_shared<const Listener>(std::move(listener))),
+      line_(std::move(line)) {}
+
+// ---- rounds
+
+Result<Watched::Plan> WatchedPartition::plan(const Context& context) {
+  const std::uint64_t own_incarnation = context.member.incarnation();
+  Frames found;
+  Plan plan;
+  Owner owner = kHeldHere;
+  {
+    Structure& structure = context.structure;
+    const Lock lock(structure.mutex);
+    const auto known = structure.directory.owner(name_);
+    if (!known) return fail(Errc::kUnknownPartition, "no partition " + quote(name_));
+    if (auto ready = route_to(structure.directory, *known, {}); !ready) {
+      return tl::unexpected(std::move(ready.error()));
     }
-    PartitionPlan::Group& group = plan.groups.back();
-    group.frames.push_back(i);
-    std::get<WatchRequest>(group.part.request.body).segments.push_back({frame.parent, frame.id});
+    owner = *known;
+    const auto serving = structure.directory.serving(name_);
+    found.incarnation = owner == kHeldHere ? own_incarnation : serving ? serving->incarnation : 0;
+    for (FrameInfo& frame : structure.forest.frames()) {
+      if (frame.owner != owner) continue;
+      found.frames.push_back({std::move(frame.id), std::move(frame.parent)});
+    }
   }
-  for (PartitionPlan::Group& group : plan.groups) {
-    group.id =
-        watch_group(partition, plan.incarnation, std::get<WatchRequest>(group.part.request.body));
+  std::sort(found.frames.begin(), found.frames.end(),
+            [](const WatchedFrame& a, const WatchedFrame& b) { return a.id < b.id; });
+  for (std::uint32_t i = 0; i < found.frames.size(); ++i) {
+    const WatchedFrame& frame = found.frames[i];
+    if (frame.parent.empty()) continue;
+    if (found.groups.empty() || found.groups.back().frames.size() == most_) {
+      WatchRequest request;
+      request.period = period_;
+      found.groups.push_back({});
+      plan.groups.push_back({0, {owner, name_, Request{0, frame.id, request}}});
+    }
+    found.groups.back().frames.push_back(i);
+    auto& request = std::get<WatchRequest>(plan.groups.back().part.request.body);
+    request.segments.push_back({frame.parent, frame.id});
   }
+  for (std::size_t i = 0; i < plan.groups.size(); ++i) {
+    const auto& request = std::get<WatchRequest>(plan.groups[i].part.request.body);
+    plan.groups[i].id = found.groups[i].id = watch_group(name_, found.incarnation, request);
+  }
+  plan.is_new = adopt(found);
   return plan;
 }
 
-FollowedPartition::FollowedPartition(std::string name, std::chrono::nanoseconds period,
-                                     Listener listener)
-    : name_(std::move(name)),
-      period_(period),
-      listener_(std::make_shared<const Listener>(std::move(listener))),
-      notices_(period.count() == 0 ? kGather : Milliseconds(0)) {}
-
-void FollowedPartition::stop() {
-  stopped_ = true;
-  notices_.stop();
+bool WatchedPartition::on_no_plan(Error why) {
+  const Lock lock(mutex_);
+  if (std::exchange(reachable_, false)) post({name_, ReachNews{false, std::move(why.message)}});
+  return true;
 }
 
-void FollowedPartition::post(PartitionNews news, std::size_t values) {
+bool WatchedPartition::on_deaf(Error why) { return on_no_plan(std::move(why)); }
+
+bool WatchedPartition::on_denied(const Part& /*part*/, const Error* why) {
+  if (why == nullptr) return false;
+  // More edges are correlated with others than an answer can have.
+  if (why->code == Errc::kInvalidInput && most_ > kMaxCorrelated) most_ = kMaxCorrelated;
+  const bool lasts = why->code == Errc::kNotPermitted || why->code == Errc::kTooMuch;
+  return lasts && on_no_plan(*why);
+}
+
+// ---- news
+
+void WatchedPartition::post(PartitionNews news, std::size_t values) {
   if (!*listener_) return;
   *waiting_ += values;
-  notices_.post([listener = listener_, waiting = waiting_, values, news = std::move(news)] {
+  line_->post([listener = listener_, waiting = waiting_, values, news = std::move(news)] {
     *waiting -= values;
     (*listener)(news);
   });
 }
 
-bool FollowedPartition::follow(const PartitionPlan& plan) {
+bool WatchedPartition::adopt(const Frames& plan) {
   const Lock lock(mutex_);
   if (!std::exchange(reachable_, true)) post({name_, ReachNews{true, {}}});
-  const auto is_known = [&](const PartitionPlan::Group& group) TFDUDE_REQUIRES(mutex_) {
+  const auto is_known = [&](const PlannedGroup& group) TFDUDE_REQUIRES(mutex_) {
     return std::any_of(groups_.begin(), groups_.end(),
                        [&](const Group& one) { return one.id == group.id && !one.outdated; });
   };
@@ -119,7 +144,7 @@ bool FollowedPartition::follow(const PartitionPlan& plan) {
 }
 
 // Keeps what is known of edges that stay, and the groups of before.
-void FollowedPartition::carry_over(const PartitionPlan& plan) {
+void WatchedPartition::carry_over(const Frames& plan) {
   std::vector<Known> known(plan.frames.size());
   if (plan.incarnation == incarnation_) {
     const std::vector<std::uint32_t> indices = places(frames_, plan.frames);
@@ -135,10 +160,10 @@ void FollowedPartition::carry_over(const PartitionPlan& plan) {
   }
   known_ = std::move(known);
   frames_ = plan.frames;
-  for (const PartitionPlan::Group& group : plan.groups) {
+  for (const PlannedGroup& group : plan.groups) {
     const auto before = std::find_if(groups_.begin(), groups_.end(),
                                      [&](const Group& one) { return one.id == group.id; });
-    Group fresh{group.id, group.frames, {}, KnownCovariances(group.frames.size())};
+    Group fresh{group, ReceivedGroup(group.frames.size()), false};
     if (before != groups_.end()) {
       *before = std::move(fresh);
     } else {
@@ -147,29 +172,8 @@ void FollowedPartition::carry_over(const PartitionPlan& plan) {
   }
 }
 
-void FollowedPartition::interrupt(const std::string& why) {
-  const Lock lock(mutex_);
-  if (std::exchange(reachable_, false)) post({name_, ReachNews{false, why}});
-}
-
-FollowedPartition::Message FollowedPartition::place(Group& group, const PushedValues& whole,
-                                                    bool knows_all) {
-  Message message;
-  message.reply = whole.after == 0;
-  message.commit = whole.commit;
-  message.follows_on =
-      message.reply || (knows_all && whole.after <= std::max(group.complete, group.replied));
-  group.heard = std::max(group.heard, whole.commit);
-  if (message.reply) {
-    group.replied = std::max(group.replied, whole.commit);
-  } else if (message.follows_on) {
-    group.complete = std::max(group.complete, whole.commit);
-  }
-  return message;
-}
-
-void FollowedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
-                              std::vector<WatchedValue>& values) {
+void WatchedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
+                             std::vector<WatchedValue>& values) {
   if (entry.index >= group.frames.size()) return;
   const std::uint32_t frame = group.frames[entry.index];
   if (frame == kGone) return;
@@ -211,20 +215,20 @@ void FollowedPartition::admit(const Group& group, PushedValue& entry, const Mess
   if (begins) values.back().begins = entry.process_noise;
 }
 
-bool FollowedPartition::take(const PushedValues& pushed) {
+bool WatchedPartition::take(const PushedValues& pushed) {
   const Lock lock(mutex_);
   const auto group = std::find_if(groups_.begin(), groups_.end(),
                                   [&](const Group& one) { return one.id == pushed.group; });
   if (group == groups_.end()) return false;
-  auto whole = group->pieces.add(pushed);
+  auto whole = group->received.whole(pushed);
   if (!whole) return false;
   if (*waiting_ + whole->entries.size() > kMostWaiting && *waiting_ > 0) {
-    group->heard = std::max(group->heard, whole->commit);
+    group->received.skip(*whole);
     if (!missing_from_) missing_from_ = recent();
     return true;
   }
-  const bool knows_all = group->covariances.fill_in(whole->entries);
-  const Message message = place(*group, *whole, knows_all);
+  const bool follows_on = group->received.place(*whole).follows_on;
+  const Message message{whole->after == 0, follows_on, whole->commit};
   if (!message.follows_on && !missing_from_) missing_from_ = recent();
   if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
   ValuesNews news{whole->commit, {}};
@@ -238,24 +242,22 @@ bool FollowedPartition::take(const PushedValues& pushed) {
   return false;
 }
 
-bool FollowedPartition::lacks_any() const {
-  return std::any_of(groups_.begin(), groups_.end(), [](const Group& group) {
-    const std::uint64_t known = std::max(group.complete, group.replied);
-    return !group.outdated && (group.replied == 0 || group.heard > known);
-  });
+bool WatchedPartition::lacks_any() const {
+  return std::any_of(groups_.begin(), groups_.end(),
+                     [](const Group& group) { return !group.outdated && group.received.lacks(); });
 }
 
-bool FollowedPartition::settles(Clock::time_point now) const {
+bool WatchedPartition::settles(Clock::time_point now) const {
   return period_.count() == 0 && (!answered_ || now - *answered_ < kSettle);
 }
 
-bool FollowedPartition::lacks(Clock::time_point now) const {
+bool WatchedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
   return lacks_any() || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.
-std::optional<Time> FollowedPartition::recent() const {
+std::optional<Time> WatchedPartition::recent() const {
   std::optional<Time> newest;
   for (const Known& known : known_) {
     if (known.newest && (!newest || *known.newest > *newest)) newest = known.newest;
@@ -269,15 +271,15 @@ std::optional<Time> FollowedPartition::recent() const {
   return oldest;
 }
 
-std::optional<Time> FollowedPartition::lacks_from() const {
+std::optional<Time> WatchedPartition::lacks_from() {
   const Lock lock(mutex_);
   return missing_from_;
 }
 
-std::set<std::uint64_t> FollowedPartition::groups(Clock::time_point now) {
+std::set<std::uint64_t> WatchedPartition::groups(Clock::time_point now) {
   const Lock lock(mutex_);
   const bool answered = std::all_of(groups_.begin(), groups_.end(), [](const Group& group) {
-    return group.outdated || group.replied != 0;
+    return group.outdated || group.received.answered();
   });
   if (answered && !answered_) answered_ = now;
   if (answered && now - *answered_ >= kKeepBefore) {

@@ -14,39 +14,17 @@
 #include "tfdude/types/partition_news.hpp"
 
 #include "base/mutex.hpp"
-#include "partition/routing.hpp"
 #include "partition/watching.hpp"
-#include "runtime/notices.hpp"
+#include "runtime/callbacks.hpp"
+#include "runtime/watched.hpp"
 
 namespace tfdude {
-
-/// The frames of a partition, and the requests that watch its edges.
-struct PartitionPlan {
-  /// Edges that the owner pushes together.
-  struct Group {
-    std::uint64_t id = 0;
-    std::vector<std::uint32_t> frames;  ///< by the entries' indices
-    Part part;
-  };
-  std::uint64_t incarnation = 0;
-  std::vector<WatchedFrame> frames;
-  std::vector<Group> groups;
-};
-
-/// The plan for a partition as it is now.
-/// @param most  edges in a group
-/// @return kUnknownPartition, kUnreachable
-[[nodiscard]] Result<PartitionPlan> plan_partition(const Forest& forest, const Directory& directory,
-                                                   const std::string& partition,
-                                                   std::chrono::nanoseconds period,
-                                                   std::uint64_t own_incarnation, std::size_t most);
 
 /// One watched partition: turns what its owner pushes into news. If the frames change, the groups
 /// of the plan before stay until those of the new one have answered, so that nothing is left out.
 /// @par Thread safety  All functions are thread-safe.
-class FollowedPartition {
+class WatchedPartition final : public Watched {
  public:
-  using Clock = std::chrono::steady_clock;
   using Listener = std::function<void(const PartitionNews&)>;
 
   /// How many values may wait for the listener.
@@ -57,33 +35,31 @@ class FollowedPartition {
   /// How long after their answer all samples are requested repeatedly, if all are wanted.
   static constexpr Milliseconds kSettle{400};
 
-  FollowedPartition(std::string name, std::chrono::nanoseconds period, Listener listener);
+  /// How long news may wait for others if all samples are wanted: to wake the listener less often.
+  static constexpr Milliseconds kGather{5};
 
-  [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] std::chrono::nanoseconds period() const { return period_; }
+  /// @param rate  [Hz]; 0: every sample
+  /// @param line  calls the listener; of this partition only, with kGather if the rate is 0
+  WatchedPartition(std::string name, double rate, Listener listener,
+                   std::shared_ptr<Callbacks::Line> line);
 
-  /// Ends it: the listener is not running and will not run, unless it calls this itself.
-  void stop();
-  [[nodiscard]] bool stopped() const { return stopped_; }
+  bool take(const PushedValues& pushed) override;
+  /// The listener is not running and will not run, unless it calls this itself.
+  void end() override { line_->close(); }
 
-  /// Maximum number of edges in a group: fewer if the owner cannot answer for more at once.
-  [[nodiscard]] std::size_t most() const { return most_; }
-  void ask_for_less() { most_ = kMaxCorrelated; }
+  // --- for the rounds, from one thread ---
 
-  /// The owner is reachable and has these frames. @return whether they or the groups are new
-  bool follow(const PartitionPlan& plan);
-  /// The owner does not answer.
-  void interrupt(const std::string& why);
-
-  /// Applies pushed values, or the reply to a request. @return whether values are missing
-  bool take(const PushedValues& pushed);
-
-  /// Whether values of the plan are missing, or may be because DDS has not matched the readers yet.
-  [[nodiscard]] bool lacks(Clock::time_point now) const;
-  /// The instant from which samples must be requested if some are missing.
-  [[nodiscard]] std::optional<Time> lacks_from() const;
-  /// The groups whose values are needed. Those of the plan before end here.
-  [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now);
+  [[nodiscard]] Result<Plan> plan(const Context& context) override;
+  bool on_no_plan(Error why) override;
+  bool on_deaf(Error why) override;
+  bool on_denied(const Part& part, const Error* why) override;
+  /// Also because DDS may not have matched the readers yet.
+  [[nodiscard]] bool lacks(Clock::time_point now) const override;
+  [[nodiscard]] std::optional<Time> lacks_from() override;
+  /// The groups of the plan before end here.
+  [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
+  /// A reply has all values of the partition.
+  [[nodiscard]] unsigned periods() const override { return 2; }
 
  private:
   struct Known {
@@ -95,15 +71,18 @@ class FollowedPartition {
     bool cleared = false;
     bool unsampled = false;
   };
-  struct Group {
+  struct PlannedGroup {
     std::uint64_t id = 0;
     std::vector<std::uint32_t> frames;  // by the entries' indices
-    PushedPieces pieces;
-    KnownCovariances covariances;
-    std::uint64_t complete = 0;  // the owner's commit up to which everything has come
-    std::uint64_t replied = 0;   // of the last reply; it has no samples but the newest
-    std::uint64_t heard = 0;
+  };
+  struct Group : PlannedGroup {
+    ReceivedGroup received;
     bool outdated = false;
+  };
+  struct Frames {
+    std::uint64_t incarnation = 0;
+    std::vector<WatchedFrame> frames;
+    std::vector<PlannedGroup> groups;
   };
   // How a message continues what is known.
   struct Message {
@@ -112,14 +91,15 @@ class FollowedPartition {
     std::uint64_t commit = 0;
   };
 
-  [[nodiscard]] Message place(Group& group, const PushedValues& whole, bool knows_all);
+  /// The owner is reachable and has these frames. @return whether they or the groups are new
+  [[nodiscard]] bool adopt(const Frames& plan);
   // Appends the value if it is news.
   void admit(const Group& group, PushedValue& entry, const Message& message,
              std::vector<WatchedValue>& values) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool lacks_any() const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool settles(Clock::time_point now) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Time> recent() const TFDUDE_REQUIRES(mutex_);
-  void carry_over(const PartitionPlan& plan) TFDUDE_REQUIRES(mutex_);
+  void carry_over(const Frames& plan) TFDUDE_REQUIRES(mutex_);
   void post(PartitionNews news, std::size_t values = 0);
 
   const std::string name_;
@@ -127,8 +107,8 @@ class FollowedPartition {
   const std::shared_ptr<const Listener> listener_;
   const std::shared_ptr<std::atomic<std::size_t>> waiting_ =
       std::make_shared<std::atomic<std::size_t>>(0);
-  std::atomic<bool> stopped_{false};
-  std::atomic<std::size_t> most_{kMaxItems};
+  const std::shared_ptr<Callbacks::Line> line_;
+  std::size_t most_ = kMaxItems;  // edges in a group; belongs to the rounds
   mutable Mutex mutex_{LockRank::kWatchedPath};
   bool reachable_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::uint64_t incarnation_ TFDUDE_GUARDED_BY(mutex_) = 0;
@@ -138,7 +118,6 @@ class FollowedPartition {
   // Samples were missing from this instant on.
   std::optional<Time> missing_from_ TFDUDE_GUARDED_BY(mutex_);
   std::optional<Clock::time_point> answered_ TFDUDE_GUARDED_BY(mutex_);
-  Notices notices_;
 };
 
 }  // namespace tfdude

@@ -1,4 +1,4 @@
-#include "runtime/pusher.hpp"
+#include "runtime/push_loop.hpp"
 
 #include <chrono>
 #include <map>
@@ -27,13 +27,13 @@ const PathEnds kArm{"base", "arm"};
 const PathEnds kHand{"arm", "hand"};
 
 // An owner of two frames, and all that it pushed.
-struct PushingOwner {
+struct PushingOwner final : PushLoop::Sink {
   PushingOwner() {
     REQUIRE(forest.add("base", "", along_x(0)));
     REQUIRE(forest.add("arm", "base", along_x(0)));
     REQUIRE(forest.add("hand", "arm", along_x(0)));
   }
-  void push(const PushedValues& values) {
+  void push(const PushedValues& values) override {
     const std::lock_guard lock(mutex);
     open.insert(values.group);
     for (const PushedValue& entry : values.entries) pushed[values.group].push_back(entry.stamp);
@@ -51,16 +51,17 @@ struct PushingOwner {
     const std::lock_guard lock(mutex);
     return open;
   }
-  Pusher pusher{forest, 1000, [this](const PushedValues& values) { push(values); },
-                [this](std::uint64_t group) {
-                  const std::lock_guard lock(mutex);
-                  open.erase(group);
-                }};
+  void end(std::uint64_t group) override {
+    const std::lock_guard lock(mutex);
+    open.erase(group);
+  }
+  Loop loop{"push"};
+  PushLoop pusher{loop, forest, 1000, *this};
 };
 
 }  // namespace
 
-TEST_CASE("pusher: every sample of a watched edge is pushed and nothing of other edges") {
+TEST_CASE("push loop: every sample of a watched edge is pushed and nothing of other edges") {
   PushingOwner owner;
   for (int t = 1; t <= 100; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
   REQUIRE(owner.pusher.watch(1, {{kHand}}));
@@ -80,7 +81,7 @@ TEST_CASE("pusher: every sample of a watched edge is pushed and nothing of other
   CHECK(owner.count(1) == 101);
 }
 
-TEST_CASE("pusher: a group is pushed no faster than its rate and ends with the newest sample") {
+TEST_CASE("push loop: a group is pushed no faster than its rate and ends with the newest sample") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kHand}, false, 50ms}));
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
@@ -98,7 +99,7 @@ TEST_CASE("pusher: a group is pushed no faster than its rate and ends with the n
   CHECK(owner.count(1) <= static_cast<std::size_t>(over / 50ms) + 3);
 }
 
-TEST_CASE("pusher: a watch of an edge that is not owned is rejected and opens no group") {
+TEST_CASE("push loop: a watch of an edge that is not owned is rejected and opens no group") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{{"arm", "nobody"}}})) == "not_owner");
   REQUIRE(owner.forest.update("hand", along_x(1), ms(1)));
@@ -107,7 +108,7 @@ TEST_CASE("pusher: a watch of an edge that is not owned is rejected and opens no
   CHECK(owner.count(1) == 0);
 }
 
-TEST_CASE("pusher: a group ends with its frame even while it is being pushed to") {
+TEST_CASE("push loop: a group ends with its frame even while it is being pushed to") {
   PushingOwner owner;
   for (int i = 0; i < 100; ++i) {
     REQUIRE(owner.pusher.watch(1, {{kHand}}));
@@ -119,7 +120,7 @@ TEST_CASE("pusher: a group ends with its frame even while it is being pushed to"
   }
 }
 
-TEST_CASE("pusher: no writer is left of a thousand groups that nobody renews") {
+TEST_CASE("push loop: no writer is left of a thousand groups that nobody renews") {
   PushingOwner owner;
   for (std::uint64_t group = 1; group <= 1000; ++group) {
     REQUIRE(owner.pusher.watch(group, {{kHand}}));
@@ -128,7 +129,7 @@ TEST_CASE("pusher: no writer is left of a thousand groups that nobody renews") {
   REQUIRE(eventually([&] { return owner.writers().empty(); }));
 }
 
-TEST_CASE("pusher: a watcher that matches late gets all values again") {
+TEST_CASE("push loop: a watcher that matches late gets all values again") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kArm, kHand}}));
   REQUIRE(eventually([&] { return owner.count(1) == 2; }));
@@ -138,7 +139,7 @@ TEST_CASE("pusher: a watcher that matches late gets all values again") {
   CHECK(owner.count(2) == 0);
 }
 
-TEST_CASE("pusher: a period above the maximum is rejected") {
+TEST_CASE("push loop: a period above the maximum is rejected") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, std::chrono::nanoseconds::max()})) ==
         "invalid_input");

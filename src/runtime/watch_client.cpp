@@ -1,0 +1,101 @@
+#include "runtime/watch_client.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
+
+#include "runtime/requests.hpp"
+
+namespace tfdude {
+namespace {
+
+Result<void> check_rate(double rate) {
+  constexpr double kLeast = 1.0 / std::chrono::duration<double>(kMaxWatchPeriod).count();
+  if (rate == 0 || (rate >= kLeast && rate <= 1e6)) return {};
+  return fail(
+      Errc::kInvalidInput,
+      "the rate of a watch must be 0, or from one an hour to 1e6 Hz, not " + number_text(rate));
+}
+
+}  // namespace
+
+Result<std::shared_ptr<WatchedPath>> WatchClient::watch(const std::string& a, const std::string& b,
+                                                        const WatchOptions& options) {
+  if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
+  const Deadline deadline = context_.discovery.call_deadline();
+  const auto names = [&] { return std::vector<std::string>{a, b}; };
+  auto known = context_.requests.after_asking(
+      deadline, names, OnDemand::kFresh, [&] { return context_.structure.forest.segments(a, b); });
+  if (!known) return tl::unexpected(std::move(known.error()));
+  return follow(std::make_shared<WatchedPath>(a, b, options, routes_), deadline);
+}
+
+Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
+    const std::vector<std::string>& frames, const WatchOptions& options) {
+  if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
+  if (frames.empty() || options.composed) {
+    return fail(Errc::kInvalidInput,
+                frames.empty() ? "no edges to watch" : "edges are not a path that can be composed");
+  }
+  const Deadline deadline = context_.discovery.call_deadline();
+  const auto names = [&] { return frames; };
+  const auto known = context_.requests.after_asking(
+      deadline, names, OnDemand::kFresh, [&]() -> Result<WatchRoute> {
+        const Lock lock(context_.structure.mutex);
+        return watch_route(context_.structure.forest, context_.structure.directory, frames, {}, 0);
+      });
+  if (!known) return tl::unexpected(known.error());
+  return follow(std::make_shared<WatchedPath>(frames, options, routes_), deadline);
+}
+
+Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<WatchedPath> path,
+                                                         const Deadline& deadline) {
+  watches_paths_ = true;
+  loop_.add(path);
+  auto live = path->wait_until_live(deadline.at());
+  if (live) return path;
+  if (live.error().code == Errc::kNotYet) return unanswered(*path, deadline);
+  return tl::unexpected(std::move(live.error()));
+}
+
+tl::unexpected<Error> WatchClient::unanswered(const WatchedPath& path, const Deadline& deadline) {
+  std::string owners;
+  if (const auto route = path.route(context_)) {
+    for (const WatchRoute::Source& source : route->sources) {
+      owners += (owners.empty() ? "" : ", ") + quote(source.partition);
+    }
+  }
+  return fail(Errc::kTimeout, "of the owners of the " + path.described() + " (" + owners +
+                                  ") not all answered within " + deadline.text());
+}
+
+Result<std::shared_ptr<WatchedPartition>> WatchClient::watch_partition(
+    const std::string& partition, double rate, WatchedPartition::Listener listener) {
+  if (auto ok = check_rate(rate); !ok) return tl::unexpected(std::move(ok.error()));
+  if (auto ok = context_.requests.check_keeps_all("watch partition " + quote(partition)); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  const Deadline deadline = context_.discovery.call_deadline();
+  auto known = context_.requests.planned(deadline, [&](const Directory& directory) -> Result<void> {
+    if (directory.owner(partition)) return {};
+    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  });
+  if (!known) return tl::unexpected(std::move(known.error()));
+  // So that the first list of frames is complete; if something is missing, it follows.
+  (void)context_.discovery.await(deadline);
+  const Milliseconds gather = rate > 0 ? Milliseconds(0) : WatchedPartition::kGather;
+  auto watched = std::make_shared<WatchedPartition>(partition, rate, std::move(listener),
+                                                    context_.threads.callbacks.line(gather));
+  loop_.add(watched);
+  return watched;
+}
+
+bool WatchClient::on_pushed(const PushedValues& pushed) {
+  loop_.on_pushed(pushed);
+  return watches_paths_;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/types/query.hpp"
+
+#include "partition/messages.hpp"
+#include "partition/routing.hpp"
+
+namespace tfdude {
+
+struct Context;
+
+/// @param rate  [Hz]; 0: every sample
+[[nodiscard]] inline std::chrono::nanoseconds watch_period(double rate) {
+  return std::chrono::nanoseconds(rate > 0 ? std::llround(1e9 / rate) : 0);
+}
+
+/// Something that is watched at its owners: what differs between a path and a partition. WatchLoop
+/// does what they have in common.
+/// @par Thread safety  All functions are thread-safe; those of rounds are called by one thread.
+class Watched {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Edges that one owner pushes together.
+  struct Group {
+    std::uint64_t id = 0;
+    Part part;  ///< a WatchRequest
+  };
+  struct Plan {
+    std::vector<Group> groups;
+    bool is_new = false;  ///< it differs from the one before
+  };
+
+  virtual ~Watched() = default;
+
+  /// Applies pushed values, or a reply. @return whether values are missing, which must be requested
+  virtual bool take(const PushedValues& pushed) = 0;
+  /// Nothing comes any more, as the client has ended.
+  virtual void end() = 0;
+  /// Whether pushed values suffice for this lookup.
+  [[nodiscard]] virtual bool can_answer(const std::string& /*a*/, const std::string& /*b*/,
+                                        const Query& /*query*/) const {
+    return false;
+  }
+
+  // --- rounds ---
+
+  /// Plans according to the current structure, and adopts the plan.
+  [[nodiscard]] virtual Result<Plan> plan(const Context& context) = 0;
+  /// There is no plan. @return whether to leave it so until something changes
+  virtual bool on_no_plan(Error why) = 0;
+  /// Values cannot be received. @return whether to leave it so until the next renewal
+  virtual bool on_deaf(Error why) = 0;
+  /// An owner has not answered with values. @param why  null: with those of another group
+  /// @return whether to leave it so until the next renewal
+  virtual bool on_denied(const Part& part, const Error* why) = 0;
+  /// All owners have answered, and nothing is missing.
+  virtual void on_complete() {}
+
+  /// Whether values of the plan are missing, or may be.
+  [[nodiscard]] virtual bool lacks(Clock::time_point now) const = 0;
+  /// The instant from which samples are requested.
+  [[nodiscard]] virtual std::optional<Time> lacks_from() = 0;
+  /// As lacks_from(), if the answers show that still earlier samples are needed.
+  [[nodiscard]] virtual std::optional<Time> lacks_earlier() { return std::nullopt; }
+  /// The groups whose values are needed.
+  [[nodiscard]] virtual std::set<std::uint64_t> groups(Clock::time_point now) = 0;
+  /// After how many periods of renewal it is renewed.
+  [[nodiscard]] virtual unsigned periods() const = 0;
+};
+
+}  // namespace tfdude
