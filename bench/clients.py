@@ -3,10 +3,10 @@
 
   clients.py [--bin DIR] [--frames N] [--daemons N] [--rounds N]
 
-It compares clients that keep all frames with clients that follow one tree: the bytes on the loopback interface until
-they know their frames, and per second while nothing happens, each without those of the daemons; and resident memory.
-Then it measures one-shot commands: time, bytes and the maximum of resident memory. Needs root for its own network
-namespace; otherwise packets of others are counted, too.
+The program compares clients that keep all frames with clients that follow one tree: the bytes on the loopback interface
+until they know their frames, and per second while nothing happens, each without those of the daemons; and resident
+memory. Then it measures one-shot commands: time, bytes and the maximum of resident memory. Needs root for its own
+network namespace; otherwise packets of others are counted, too.
 """
 
 import argparse

@@ -3,8 +3,8 @@
 
     python3 bench/recorded.py [--edges N] [--rate HZ] [--seconds S]     needs push_load of bench/net
 
-It prints a line of JSON for each figure, and runs in a network of its own. Processor time is that of the whole process
-that records or reads, from /proc. That of zstd alone is measured on the uncompressed file.
+The program prints a line of JSON for each figure, and runs in a network of its own. Processor time is that of the whole
+process that records or reads, from /proc. That of zstd alone is measured on the uncompressed file.
 """
 
 import argparse

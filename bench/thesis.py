@@ -1,7 +1,7 @@
 """The thesis's chapter 5 as data: the cases of its figures, and its results for each.
 
-It prints medians for one plot only (5.10). For the others its text gives a ratio, a difference, or another case that is
-similar.
+The thesis prints medians for one plot only (5.10). For the others its text gives a ratio, a difference, or another case
+that is similar.
 """
 
 import dataclasses

@@ -8,7 +8,7 @@
 
 #include "server.hpp"
 
-// Who is served, and what: the rules, without a network.
+// The rules of whom the site serves, and what, without a network.
 namespace tfdude::web {
 
 struct Access {

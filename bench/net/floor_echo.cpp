@@ -3,7 +3,7 @@
 //
 //   floor_echo --domain DOMAIN --profile FILE --partition NAME
 //
-// It is asked in this DDS partition (empty: the default one), and answers in the default one.
+// The DDS partition of requests (empty: the default one); it answers in the default one.
 
 #include <cstdio>
 #include <string>

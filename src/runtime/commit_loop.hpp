@@ -36,7 +36,7 @@ class CommitLoop {
     [[nodiscard]] virtual Ready take(bool values_due) = 0;
     /// Publishes its pages and its presence.
     virtual void publish(const Ready& ready) = 0;
-    /// It could not be stored: the next take() returns it again, without the replies.
+    /// What was taken could not be stored: the next take() returns it again, without the replies.
     virtual void take_back(const Ready& ready) = 0;
     virtual void reply(const PendingReply& reply) = 0;
   };

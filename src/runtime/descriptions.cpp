@@ -54,7 +54,7 @@ Result<std::string> Descriptions::of(const std::string& partition, const Deadlin
     if (!part) return tl::unexpected(std::move(part.error()));
     if (part->size == 0) return std::string();
     if (!text.empty() && part->hash != hash) {
-      // It was replaced meanwhile.
+      // The text was replaced meanwhile.
       text.clear();
       continue;
     }

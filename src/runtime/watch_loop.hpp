@@ -30,7 +30,7 @@ class WatchLoop {
   /// After it has returned nothing new comes, and what is watched reports so.
   void stop();
 
-  /// It is watched while it has another holder.
+  /// Watched while it has another holder.
   void add(std::shared_ptr<Watched> watched);
 
   /// Applies pushed values.

@@ -106,7 +106,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   /// Whether the error means that the path no longer exists. The news of a move may come before
   /// that of its destination.
   [[nodiscard]] bool is_gone(const Error& error, Clock::time_point now);
-  /// It exists: is_gone() begins to count again.
+  /// The path exists: is_gone() begins to count again.
   void planned();
   /// Frees mirrors that have no readers any more.
   void collect();

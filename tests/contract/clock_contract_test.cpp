@@ -143,7 +143,7 @@ TEST_CASE("clock: after a jump back a replay works") {
   CHECK(outcome(sim.client->lookup("world", "hand", Query{})) == "not_yet");
   CHECK(outcome(sim.base->lookup("world", "arm", at(ms(100)))) == "not_yet");
   CHECK(eventually([&] { return outcome(watch->latest()) == "not_yet"; }));
-  // Who begins to watch now is told, too.
+  // A watch that begins now is told, too.
   const auto other = sim.base->watch("world", "hand", options);
   CHECK(outcome(other ? other->latest() : tl::unexpected(other.error())) == "not_yet");
   play(7);
@@ -192,7 +192,7 @@ TEST_CASE("clock: each participant says which clock it uses") {
   Node real = Node::open(join("real"), "real", {{"hand", "arm", along_x(1)}}).value();
   Client client = Client::open(join("")).value();
   for (Client* caller : {static_cast<Client*>(&sim), static_cast<Client*>(&real), &client}) {
-    // It comes with the presence, which may be later than the first page.
+    // The kind of the clock comes with the presence, which may be later than the first page.
     CHECK(eventually([&] { return clock_of(*caller, "sim") == ClockKind::kExternal; }));
     CHECK(eventually([&] { return clock_of(*caller, "real") == ClockKind::kSystem; }));
     const auto path = caller->path("world", "hand");

@@ -1,5 +1,5 @@
-// Who serves a name, who hears of partitions that end, and what happens to their frames, over each
-// transport.
+// Which process serves a name, what others hear of partitions that end, and what happens to their
+// frames, over each transport.
 
 #include <algorithm>
 #include <array>

@@ -62,7 +62,7 @@ TEST_CASE("publish: sent values arrive although the client ends at once") {
       auto client = Client::open(join("")).value();
       REQUIRE(outcome(client.publish({{"a_tip", along_x(run)}})) == "ok");
     }
-    // It has arrived when the client has ended; only the owner's thread may still have to apply it.
+    // The value has arrived when the client has ended; the owner may still have to apply it.
     CHECK(eventually([&] { return is_at(a, "a_base", "a_tip", run); }));
   }
 }

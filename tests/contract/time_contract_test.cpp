@@ -221,7 +221,7 @@ TEST_CASE("a lookup over dynamic edges of several owners is the motion at its st
     REQUIRE(found);
     REQUIRE(found->stamp.has_value());
     REQUIRE(testing::pose_diff(found->pose, motion.whole(*found->stamp), 1e-8) == "");
-    // It is not old either: for consecutive lookups, no more than a moment.
+    // The instant is not old either: for consecutive lookups, no more than a moment.
     REQUIRE(wall_clock() - *found->stamp < 5s);
     const auto one = chain.client->lookup("world", "base", Query{});
     const auto two = chain.client->lookup("base", "hand", Query{});

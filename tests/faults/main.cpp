@@ -95,7 +95,7 @@ int run(const Arguments& arguments) {
 }  // namespace tfdude::faults
 
 int main(int argc, char** argv) {
-  // It would be that of each of the random sequences here, which differ.
+  // This seed would be that of each of the random sequences here, which differ.
   unsetenv("TFDUDE_SEED");
   tfdude::faults::Arguments arguments;
   CLI::App app{"Looks for contradictions while daemons die, hang and are cut off"};

@@ -87,7 +87,7 @@ bool Nemesis::connected(std::size_t partition) const { return cut_.count(partiti
 void Nemesis::kill(std::size_t partition) {
   cluster_.kill(partition);
   if (starting_.erase(partition) > 0) {
-    // It never served, so nobody can notice that it is gone.
+    // The daemon never served, so nobody can notice that it is gone.
     observer_.disregard(partition);
     journal_.calm_down();
   } else if (connected(partition)) {

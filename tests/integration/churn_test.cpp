@@ -78,7 +78,7 @@ TEST_CASE("churn: fifty daemons and clients come and go under load without an er
     }
     if (alive.size() < 8) continue;
     if (i % 2 == 0) testing::await_ready(alive.back());
-    // Whoever came first goes, killed or told to.
+    // The first that came goes, killed or told to.
     alive.front().signal(random.index(2) == 0 ? SIGKILL : SIGTERM);
     REQUIRE(eventually([&] { return !alive.front().runs(); }));
     alive.pop_front();

@@ -123,7 +123,7 @@ TEST_CASE("clock: daemons and the command line follow a simulation") {
             .at("code") == "not_yet");
 
   Simulator simulator(sim.domain);
-  // It starts at zero and stands still there.
+  // The simulation starts at zero and stands still there.
   REQUIRE(eventually([&] {
     const CliResult result =
         sim.domain.cli({"--json", "update", "arm", "--xyz", "0", "0", "0", "--rpy", "0", "0", "0"});
@@ -135,7 +135,7 @@ TEST_CASE("clock: daemons and the command line follow a simulation") {
   CHECK(stamp_of(start) < 1000);  // [ns]: as little as possible, where stamps would be equal
   CHECK(sim.ask({"lookup", "world", "hand", "--at", "0"}).at("translation").at(0) == 0.0);
 
-  // It jumps ahead, and stands still again.
+  // The simulation jumps ahead, and stands still again.
   simulator.jump_to(8);
   REQUIRE(eventually([&] { return simulator.now() == 8; }));
   REQUIRE(eventually([&] {

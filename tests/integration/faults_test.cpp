@@ -74,7 +74,7 @@ TEST_CASE("faults: a client that joins after a daemon was killed learns that it 
   ThesisDaemons d;
   d.arms->kill();
   auto joiner = Client::open(d.domain.options(kPatience)).value();
-  // It may come before the other daemon has noticed.
+  // The joiner may come before the other daemon has noticed.
   REQUIRE(eventually([&] { return joiner.partitions().value().size() == 2; }));
   CHECK_FALSE(joiner.partitions().value().at(0).reachable);
   check_arms_missing(joiner);

@@ -91,7 +91,7 @@ class Checked {
   }
 
  private:
-  // It needs no participant, and takes no option of the network.
+  // Such a command needs no participant, and takes no option of the network.
   static CliResult alone(Arguments arguments) {
     arguments.insert(arguments.begin(), TFDUDE_CLI);
     Process process(arguments);
@@ -192,7 +192,7 @@ TEST_CASE("json: what each command prints is as the schema says") {
   Process replay = other.start_cli({"--json", "replay", file, "--rate", "1000"});
   CHECK(replay.wait(in_time()) == 0);
   checked.check("replay", replay.out());
-  // It finds something on some computers.
+  // The doctor finds something on some computers.
   const CliResult doctor = d.domain.cli({"--json", "doctor"});
   checked.check("doctor", doctor.out);
   const std::string keys = directory.path() + "/keys";

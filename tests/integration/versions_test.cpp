@@ -45,7 +45,7 @@ TEST_CASE("versions: a daemon of a later major version is listed but not used") 
   auto client = Client::open(options);
   REQUIRE(client);
   REQUIRE(client->lookup("world", "mount"));
-  // It needs none of our topics, because its name and version are announced in DDS's discovery.
+  // No topic of ours is needed, because name and version are announced in DDS's discovery.
   const ForeignWriter later(domain.number(), "tfdude/later",
                             fastdds::edds::TypeSupport(new RawType("later", false)), "", false,
                             {"tfdude serving arm", kLater});
@@ -79,7 +79,7 @@ TEST_CASE("versions: messages of a later major version are ignored") {
   const Options options = local(domain.number());
   auto base = Node::open(transport_of(options, "base"), "base", {{"world", "", {}}}, options);
   REQUIRE(base);
-  // It writes a page that this version could read.
+  // A participant that writes a page that this version could read.
   ForeignWriter later(domain.number(), "tfdude/directory",
                       fastdds::edds::TypeSupport(new wire::PagePubSubType), "arm", true,
                       {"tfdude serving arm", kLater});

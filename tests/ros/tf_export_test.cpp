@@ -140,7 +140,7 @@ TEST_CASE("ros export: a change of one static edge sends those of all groups") {
   REQUIRE(all.size() == 2);
   CHECK(all[0].stamp == at(9));
   CHECK(all[1].child == "c");
-  // It becomes dynamic.
+  // The edge becomes dynamic.
   CHECK(sent.set_static(1, one, {value(3, at(1))}));
   CHECK(sent.all_static(at(9)).size() == 1);
   CHECK(sent.erase_static(2));

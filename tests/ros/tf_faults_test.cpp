@@ -73,7 +73,7 @@ TEST_CASE("ros faults: frames of another partition are not taken, also while it 
       "arm.yaml", "partition: arm\nframes:\n  - {id: base}\n  - {id: tool, parent: base}\n");
   auto daemon = rig.dude().start_daemon({"--config", config});
   testing::await_ready(daemon);
-  // It remembers who is away.
+  // The witness remembers who is away.
   Node witness = Node::open("witness", {{"w", "", {}}}, rig.dude().options()).value();
   REQUIRE(eventually([&] { return owner_of(client, "tool") == "arm"; }));
 

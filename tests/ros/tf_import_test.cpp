@@ -100,7 +100,7 @@ TEST_CASE("ros import: static transforms have no stamp, and are written only if 
         "root base; add lidar under base; ");
   CHECK(rig.take({edge("base", "lidar", 9)}, "w1", true).empty());
   CHECK(text(rig.take({edge("base", "lidar", 9, 0.5)}, "w1", true)) == "always lidar; ");
-  // It becomes dynamic by its first sample, and static again by dropping them.
+  // The edge becomes dynamic by its first sample, and static again by dropping them.
   CHECK(text(rig.take({edge("base", "lidar", 10)})) == "at 10000 lidar; ");
   CHECK(text(rig.take({edge("base", "lidar", 11)}, "w1", true)) == "move lidar under base; ");
 }

@@ -150,7 +150,7 @@ class ScriptedOwner {
 
   Node& node() { return *node_; }
   [[nodiscard]] int asked() const { return ear_->asked; }
-  /// It ends in order, and announces that.
+  /// The participant ends in order, and announces that.
   void leave() { node_.reset(); }
 
  private:

@@ -269,7 +269,7 @@ TEST_CASE("An edge of unknown correlation gains nothing from the same measuremen
   REQUIRE(mixed);
   CHECK_FALSE(mixed->edges[0].corrected);
   CHECK(mixed->edges[1].corrected);
-  // It gets no better than the unknown edge between it and the measurement.
+  // The edge gets no better than the unknown edge between it and the measurement.
   const Matrix6d left = mixed->edges[1].X_PC.own.matrix();
   CHECK(left.trace() < known.own.matrix().trace());
   CHECK(testing::domination(

@@ -204,7 +204,7 @@ TEST_CASE("an owner keeps a frame that an unreachable partition claims when that
   base.absent = {{"arm", 0, Kind::kLost, 7}};
   replica.directory.apply(base, kNow);
   REQUIRE(partition.load({{"hand", "", along_x(1)}}, kNow));
-  // It reports the absence itself after some time.
+  // This participant reports the absence itself after some time.
   CHECK(replica.directory.absent().empty());
   CHECK_FALSE(replica.directory.look_for_gone(kStart));
   CHECK_FALSE(replica.directory.look_for_gone(kStart + Absences::kGrace / 2));

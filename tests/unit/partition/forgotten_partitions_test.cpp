@@ -40,7 +40,7 @@ TEST_CASE("a forgotten partition is removed also by participants that were away"
   away.directory.apply(said, kNow);
   CHECK(away.structure().empty());
   CHECK_FALSE(away.directory.owner("arm"));
-  // It passes on that the partition is forgotten.
+  // The participant passes on that the partition is forgotten.
   REQUIRE(away.directory.absent().size() == 1);
   CHECK(away.directory.absent()[0].kind == Kind::kForgotten);
   // Its remaining messages are late; those of a new process are not.
@@ -163,7 +163,7 @@ TEST_CASE("a partition is forgotten with a later process that only some have hea
 }
 
 TEST_CASE("an owner that restarts tells a returning partition that it was forgotten") {
-  // It has met the partition before it reads what its predecessor has stored.
+  // The process knows the partition before it reads what its predecessor has stored.
   Witness base;
   base.directory.restore({{"arm", 0, Kind::kForgotten, 1}});
   const auto told = [&] { return !base.directory.absent().empty(); };

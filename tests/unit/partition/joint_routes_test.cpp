@@ -110,7 +110,7 @@ TEST_CASE("joint routes: a partition that has lost all its frames moves nothing"
   caller.meet("left", {{"elbow", ""}});
   caller.meet("right", {{"elbow", ""}});
   REQUIRE(caller.directory.lost("left", 1, kNow));
-  // It may return at any moment.
+  // The owner may return at any moment.
   CHECK(caller.routes("elbow") == Lines{kSay});
   REQUIRE(caller.directory.forget("left", 1, kNow));
   CHECK(caller.routes("elbow") == Lines{"right gets elbow"});

@@ -211,7 +211,7 @@ class Contest {
     one.said.serving = turn == Turn::kMine;
     one.said.stopped = turn == Turn::kOthers;
     if (turn == Turn::kMine && one.pause > 0) {
-      // It has decided to serve, and announces it later.
+      // The process has decided to serve, and announces it later.
       --one.pause;
       return;
     }

@@ -149,7 +149,7 @@ TEST_CASE("recording: within the gap of a death it answers as the live system: u
   CHECK(why.error().message == "partition 'arm' was lost");
   CHECK(then(recording, "hand", 10.03) == "111.030000 at 10030");
   CHECK(then(recording, "arm", 10) == "1.000000");
-  // It is in the structure all the time.
+  // The frame is in the structure all the time.
   recording.seek(at(7));
   CHECK(recording.exists("hand"));
   CHECK_FALSE(recording.partitions().at(0).reachable);

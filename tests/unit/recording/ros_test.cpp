@@ -88,7 +88,7 @@ TEST_CASE("recording of ROS: quaternions are normalized as in tf2, and others co
   REQUIRE(problems.size() == 3);
   CHECK_THAT(problems[0], ContainsSubstring("'zero'") && ContainsSubstring("not of unit length"));
   CHECK_THAT(problems[1], ContainsSubstring("'base'") && ContainsSubstring("its own parent"));
-  // It still answers.
+  // The recording still answers.
   CHECK(recording->lookup("base", "good"));
   recording->read_all();
   CHECK(recording->summary().left_out == 4);

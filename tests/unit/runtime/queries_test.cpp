@@ -56,7 +56,7 @@ TEST_CASE("queries: a frame is called unknown only after all owners are known") 
   CHECK(outcome(asker.queries.find("hand")) == "unknown_frame");
   CHECK(outcome(asker.queries.path("world", "hand")) == "unknown_end");
   CHECK(outcome(asker.queries.history("hand")) == "unknown_frame");
-  // It has announced two pages, and none has arrived.
+  // The owner has announced two pages, and none has arrived.
   asker.on_presence({"arm", 1, "host", 1, 2, true});
   Asker joiner(network);
   joiner.on_presence({"arm", 1, "host", 1, 2, true});

@@ -229,7 +229,7 @@ TEST_CASE("member runner: ignored messages of a process are logged once") {
 TEST_CASE("yielding: a frame is yielded only after the other owner has confirmed its older claim") {
   LoopbackNetwork network;
   std::atomic<bool> silent{true};
-  // It claimed the hand first, but the second owner does not know that when it claims the hand.
+  // The first owner claimed the hand first; the second one does not know that when it claims it.
   ScriptedOwner first(network, "first", {{"arm", "", {}}},
                       [&](Transport&, const PeerId&, const Request& request) {
                         return silent && std::holds_alternative<RemoveRequest>(request.body);
