@@ -34,6 +34,11 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
 // The pages of a new incarnation, collected beside the current ones; null if the current ones need
 // not be kept.
 Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarnation) {
+  // Only the latest process succeeds. One whose pages came late, while the partition was lost, does
+  // not, and would leave the structure incomplete for ever.
+  if (partition.successor && partition.successor->incarnation != partition.live) {
+    partition.successor.reset();
+  }
   if (incarnation == partition.incarnation) return nullptr;
   if (partition.pages.empty()) {
     partition.incarnation = incarnation;

@@ -176,6 +176,9 @@ class Directory {
   /// The name of a reachable partition with an announced change that has not come yet; null: none.
   [[nodiscard]] const std::string* behind() const;
 
+  /// Forgets the absence of partitions that are back and of which nothing is contested any more.
+  /// Called after each input: a message, or a change of own frames. @return whether there were any
+  bool resolve_returns();
   /// The partitions that this participant misses, for its presence.
   [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 
@@ -262,7 +265,6 @@ class Directory {
   void mark_absent(Known& partition, Owner owner, bool stopped, Time now,
                    std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
-  void resolve_returns();
   void tell_claims();
   Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);

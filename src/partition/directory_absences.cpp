@@ -258,7 +258,7 @@ std::optional<std::uint64_t> Directory::hidden_by(std::uint64_t own) const {
 
 // A return is resolved once all claims of the partition have come, and none of its frames is held
 // here.
-void Directory::resolve_returns() {
+bool Directory::resolve_returns() {
   bool resolved = false;
   for (const std::string& name : absences_.back()) {
     const auto number = number_of(name);
@@ -270,6 +270,7 @@ void Directory::resolve_returns() {
     resolved = true;
   }
   if (resolved) tell_claims();
+  return resolved;
 }
 
 std::optional<PartitionInfo> Directory::only_heard_of() const {

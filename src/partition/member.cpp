@@ -241,6 +241,8 @@ void Member::compare_plans() {
 }
 
 Outcome Member::take_outcome() {
+  // A frame that was yielded or removed here may have been the last one that was contested.
+  if (directory_.resolve_returns() && partition_ != nullptr) outcome_.to_commit = true;
   compare_plans();
   outcome_.outdated = directory_.take_outdated();
   outcome_.events = directory_.changes().take();

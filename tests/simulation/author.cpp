@@ -107,15 +107,24 @@ bool Author::may_be_lost(Instant since) const {
 
 // ---- calls
 
+// The time alone does not say so: the clock of the process may be ahead.
+bool Author::has_heard(Process& node) const {
+  const Directory& known = node.directory();
+  const auto changes = process_->directory().told();
+  const bool all = std::all_of(changes.begin(), changes.end(), [&](const SeenEpoch& change) {
+    const auto owner = known.owner(change.partition);
+    return change.partition == node.partition() || (owner && known.epoch(*owner) >= change.epoch);
+  });
+  return all && known.latest_lamport_time() >= process_->directory().latest_lamport_time();
+}
+
 // Some changes are made by a Node in the process of the owner, once it has heard of the author's
 // changes: nothing orders those of two who know nothing of each other.
 void Author::change(const std::string& what, const std::string& owner, const RouteOf& route,
                     Then then) {
   if (random_.index(5) == 0) {
     const auto node = process_->world().serving(owner);
-    const bool heard = node && node->directory().latest_lamport_time() >=
-                                   process_->directory().latest_lamport_time();
-    const auto parts = heard ? route(*node) : Result<std::vector<Part>>();
+    const auto parts = node && has_heard(*node) ? route(*node) : Result<std::vector<Part>>();
     if (parts && parts->size() == 1 && parts->front().owner == kHeldHere) {
       return change_here(node, "node-" + what, parts->front().request, then);
     }

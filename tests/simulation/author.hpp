@@ -78,6 +78,8 @@ class Author : public std::enable_shared_from_this<Author> {
   [[nodiscard]] OperationKind draw_kind();
   void remember();
   /// Whether a partition, or any, may have lost what it has acknowledged since then.
+  /// Whether a process knows all changes that this author has made.
+  [[nodiscard]] bool has_heard(Process& node) const;
   [[nodiscard]] bool may_be_lost(const std::string& partition, Instant since) const;
   [[nodiscard]] bool may_be_lost(Instant since) const;
   void judge(const std::string& a, const std::string& b, const Result<StampedTransform>& X_AB,

@@ -306,6 +306,18 @@ TEST_CASE("an absence that is reported late is dropped if the partition is back 
   CHECK_FALSE(arms.directory.any_pending());
 }
 
+TEST_CASE("a late page of an earlier process does not keep the structure incomplete") {
+  Witness client("");
+  client.hear("arm", 3, 10);
+  client.lose("arm", 3);
+  client.wait();
+  client.directory.apply(page_of("arm", {{"hand", "", 10}, {"old", "hand", 5}}, 2));
+  client.hear("arm", 3, 10);
+  CHECK(client.directory.complete());
+  CHECK(client.directory.absent().empty());
+  CHECK_FALSE(client.forest.exists("old"));
+}
+
 TEST_CASE("in a cycle a reachable partition keeps its parent and a lost one does not") {
   Replica base("base");
   base.directory.apply(presence_of("arm", 1, 1), kNow);

@@ -354,6 +354,29 @@ TEST_CASE("claiming: a free name is taken after the discovery time and then serv
   }
 }
 
+TEST_CASE("member: an absence ends with the last contested frame, without another message") {
+  const Presence legs = presence_of("legs", 1, 1);
+  Serving arms;
+  arms.member.on_presence(legs, kNow);
+  arms.member.on_page({"legs", 0, 1, 2, {{"foot", "", 10}}});
+  arms.member.on_lost("legs", 1, kNow);
+  for (auto after = Milliseconds(0); after <= Absences::kTakeover; after += Milliseconds(100)) {
+    arms.member.on_time(Absences::Steady(after));
+  }
+  CHECK_FALSE(arms.ask(1, "foot", AddRequest{"arm", along_x(1)}));
+  REQUIRE(arms.forest.holds("foot"));
+  arms.member.on_presence(legs, kNow);
+  (void)arms.member.take_outcome();
+  REQUIRE(arms.directory.absent().size() == 1);
+  CHECK(arms.directory.absent()[0].kind == Absent::Kind::kBack);
+  (void)arms.member.stored(arms.member.take_ready());
+  REQUIRE(arms.member.release({"foot"}, kNow));
+  CHECK(arms.member.take_outcome().to_commit);
+  const Ready ready = arms.member.take_ready();
+  REQUIRE(ready.presence);
+  CHECK(ready.presence->absent.empty());
+}
+
 TEST_CASE("a partition that returns with a page first is told to whoever waits or streams") {
   constexpr Time kThen{std::chrono::seconds(100)};
   Replica replica;
