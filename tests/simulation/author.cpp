@@ -110,7 +110,7 @@ bool Author::may_be_lost(Instant since) const {
 // The time alone does not say so: the clock of the process may be ahead.
 bool Author::has_heard(Process& node) const {
   const Directory& known = node.directory();
-  const auto changes = process_->directory().told();
+  const auto changes = process_->directory().announced_epochs();
   const bool all = std::all_of(changes.begin(), changes.end(), [&](const SeenEpoch& change) {
     const auto owner = known.owner(change.partition);
     return change.partition == node.partition() || (owner && known.epoch(*owner) >= change.epoch);
