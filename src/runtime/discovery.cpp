@@ -6,6 +6,7 @@
 #include "tfdude/base/time.hpp"
 
 #include "base/mutex.hpp"
+#include "calls/call.hpp"
 
 namespace tfdude {
 namespace {
@@ -25,8 +26,6 @@ Discovery::Discovery(Structure& structure, const Transport& transport, Milliseco
       timeout_(timeout),
       met_by_(Deadline(search_time).at()),
       told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
-
-bool Discovery::may_appear(Errc code) { return is_unknown(code) || code == Errc::kNotConnected; }
 
 bool Discovery::complete() {
   if (complete_.load(std::memory_order_relaxed)) return true;

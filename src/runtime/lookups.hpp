@@ -10,12 +10,10 @@
 #include "tfdude/types/query.hpp"
 
 #include "runtime/discovery.hpp"
-#include "runtime/gathering.hpp"
 #include "runtime/pending_lookups.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
 #include "runtime/watcher.hpp"
-#include "transport/port.hpp"
 
 namespace tfdude {
 
@@ -26,8 +24,8 @@ class Lookups {
  public:
   /// @param watcher  of values that others push
   /// @param timeout  of one attempt of a waiting lookup
-  Lookups(Structure& structure, Discovery& discovery, Requests& requests, Transport& transport,
-          const Watcher& watcher, Milliseconds timeout);
+  Lookups(Structure& structure, Discovery& discovery, Requests& requests, const Watcher& watcher,
+          Milliseconds timeout);
 
   /// Ends all waiting lookups and callbacks: as PendingLookups::stop().
   void stop() { pending_.stop(); }
@@ -86,17 +84,8 @@ class Lookups {
 
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
                                                    const Query& query, const Deadline& deadline);
-  [[nodiscard]] PendingLookups::Links links(Transport& transport, const Watcher& watcher);
-  /// As route_lookup(). @return also kInvalidInput if ages are wanted, and clocks differ
-  [[nodiscard]] Result<LookupPlan> routed(const Directory& directory, const std::string& a,
-                                          const std::string& b, const Query& query,
-                                          std::optional<Time> hint) const;
-  /// Adds to an error about data in time that clocks differ.
-  void explain(Error& error, const std::vector<Part>& parts) const;
-  /// Names an owner with another clock than this participant; empty: there is none.
-  [[nodiscard]] std::string other_clock(const Directory& directory,
-                                        const std::vector<Part>& parts) const;
-  [[nodiscard]] Result<Gathering> plan(const PendingLookups::Wanted& wanted);
+  [[nodiscard]] PendingLookups::Links links(const Watcher& watcher);
+  [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted);
   [[nodiscard]] Result<StampedTransform> elsewhere(Handle a, Handle b, const Query& query,
                                                    const Deadline& deadline);
 

@@ -22,7 +22,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       transport_(std::move(transport)),
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(structure_, *transport_, std::move(partition), parts()),
-      requests_(structure_, discovery_, *transport_, own(), follow()),
+      requests_(structure_, discovery_, *transport_, *this, follow()),
       yielding_(structure_, requests_, member_, options.timeout),
       serving_(structure_, discovery_, *transport_, member_, options_),
       queries_(structure_, discovery_, requests_, member_, *transport_),
@@ -37,7 +37,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
           },
           options.timeout),
       pushing_(structure_, *transport_, member_, watcher_, options.limits.watches),
-      lookups_(structure_, discovery_, requests_, *transport_, watcher_, options.timeout),
+      lookups_(structure_, discovery_, requests_, watcher_, options.timeout),
       velocities_(structure_, requests_, lookups_),
       descriptions_(requests_, options.description),
       streams_(edge_links(structure_, *transport_, member_),
@@ -52,7 +52,7 @@ MemberRunner::Parts Participant::parts() {
             streams_.look_again();
             lookups_.look_again();
           },
-          [this](const std::string& partition) { requests_.calls().on_lost(partition); },
+          [this](const std::string& partition) { requests_.replies().on_lost(partition); },
           [this] { yielding_.ask(); }};
 }
 
@@ -69,16 +69,9 @@ Result<Streams*> Participant::streams() {
   return &streams_;
 }
 
-Requests::Own Participant::own() {
-  return {[this](const Request& request) {
-            auto reply = answer_query(request);
-            return reply ? *std::move(reply) : member_.answer(request);
-          },
-          [this](const Deadline& deadline) { member_.tell(deadline); },
-          [this](const Request& request, const Deadline& deadline) {
-            return member_.await_stored(request, deadline);
-          },
-          [this] { return member_.still_in(); }};
+Reply Participant::answer_own(const Request& request) {
+  auto reply = answer_query(request);
+  return reply ? *std::move(reply) : member_.answer(request);
 }
 
 Participant::~Participant() {

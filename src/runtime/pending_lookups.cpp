@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/mutex.hpp"
-#include "runtime/discovery.hpp"
 
 namespace tfdude {
 namespace {
@@ -23,7 +22,7 @@ constexpr int kRest = 3;
 constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
-bool is_structural(Errc code) { return Discovery::may_appear(code) || code == Errc::kUnreachable; }
+bool is_structural(Errc code) { return may_appear(code) || code == Errc::kUnreachable; }
 
 }  // namespace
 
@@ -41,8 +40,9 @@ bool is_worth_waiting(const Error& error, const Query& query) {
   }
 }
 
-PendingLookups::PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links)
-    : forest_(forest), calls_(calls), hints_(hints), links_(std::move(links)) {}
+PendingLookups::PendingLookups(Forest& forest, ReplyTable& replies, RequestLink& link,
+                               SharedHints& hints, Links links)
+    : forest_(forest), replies_(replies), link_(link), hints_(hints), links_(std::move(links)) {}
 
 void PendingLookups::stop() {
   {
@@ -71,8 +71,8 @@ void PendingLookups::give_up(Lookup& lookup) {
   }
 }
 
-std::future<PendingLookups::Found> PendingLookups::add(Wanted wanted, const Deadline& deadline,
-                                                       Error last) {
+std::future<PendingLookups::Found> PendingLookups::add(WantedLookup wanted,
+                                                       const Deadline& deadline, Error last) {
   auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
   auto future = lookup->promise.get_future();
   add(std::move(lookup));
@@ -80,7 +80,7 @@ std::future<PendingLookups::Found> PendingLookups::add(Wanted wanted, const Dead
 }
 
 std::shared_ptr<OneCall<PendingLookups::Found>> PendingLookups::add(
-    Wanted wanted, const Deadline& deadline, Error last, OneCall<Found>::Function callback) {
+    WantedLookup wanted, const Deadline& deadline, Error last, OneCall<Found>::Function callback) {
   auto lookup = std::make_unique<Lookup>(std::move(wanted), deadline, std::move(last));
   auto call = lookup->callback = std::make_shared<OneCall<Found>>(std::move(callback));
   add(std::move(lookup));
@@ -177,7 +177,7 @@ bool PendingLookups::attend(Lookup& lookup, bool written) {
 
 bool PendingLookups::attempt(Lookup& lookup) {
   lookup.version = version();
-  const Wanted& wanted = lookup.wanted;
+  const WantedLookup& wanted = lookup.wanted;
   auto here = forest_.lookup(wanted.a, wanted.b, wanted.query);
   const bool all_held =
       here || here.error().code == Errc::kNotYet || here.error().code == Errc::kTooOld;
@@ -185,14 +185,15 @@ bool PendingLookups::attempt(Lookup& lookup) {
   auto plan = links_.plan(wanted);
   if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), links_.plan_asks);
   if (lookup.deadline.over()) return judge(lookup, tl::unexpected(lookup.last), true);
-  lookup.gathering = *std::move(plan);
+  lookup.plan.emplace(*std::move(plan));
   lookup.until = lookup.deadline.within(links_.timeout);
   return ask(lookup);
 }
 
 bool PendingLookups::ask(Lookup& lookup) {
-  lookup.asking.emplace(calls_, lookup.gathering->parts(), [this] { wake(urgent_); });
-  if (const Error* lacking = lookup.asking->answer(links_.answer_here)) {
+  lookup.asking.emplace(replies_, lookup.plan->parts(), *lookup.until,
+                        static_cast<ReplyListener*>(this));
+  if (const Error* lacking = lookup.asking->answer(link_)) {
     // No other owner is asked in vain.
     Error error = *lacking;
     lookup.asking.reset();
@@ -204,18 +205,18 @@ bool PendingLookups::ask(Lookup& lookup) {
 bool PendingLookups::go_on_asking(Lookup& lookup) {
   const auto now = Clock::now();
   if (!lookup.asking->complete() && !lookup.until->over(now)) {
-    lookup.next = std::min(lookup.asking->send_due(now, links_.send), lookup.until->at());
+    lookup.next = std::min(lookup.asking->send_due(now, link_), lookup.until->at());
   }
   if (!lookup.asking->complete()) {
     if (!lookup.until->over(now)) return false;
-    lookup.asking->give_up(*lookup.until);
+    lookup.asking->give_up();
     // Their last answer is more informative than the fact that they had no time to repeat it.
     if (lookup.deadline.over(now) && lookup.last.code != Errc::kTimeout) {
       lookup.asking.reset();
       return judge(lookup, tl::unexpected(lookup.last), true);
     }
   }
-  auto found = lookup.gathering->take(lookup.asking->take_replies(), hints_);
+  auto found = lookup.plan->take(lookup.asking->take_replies(), hints_, now);
   lookup.asking.reset();
   return found ? judge(lookup, *std::move(found), true) : ask(lookup);
 }

@@ -12,10 +12,10 @@
 #include "tfdude/types/query.hpp"
 
 #include "base/mutex.hpp"
-#include "runtime/asking.hpp"
+#include "calls/lookup_in_progress.hpp"
+#include "calls/pending_requests.hpp"
 #include "runtime/callbacks.hpp"
 #include "runtime/deadline.hpp"
-#include "runtime/gathering.hpp"
 #include "runtime/one_call.hpp"
 #include "tree/forest.hpp"
 
@@ -29,27 +29,18 @@ namespace tfdude {
 /// polled at growing intervals, and asked again as soon as they have pushed sufficient data. The
 /// thread never waits for others, and runs no user code.
 /// @par Thread safety  All functions are thread-safe.
-class PendingLookups {
+class PendingLookups final : private ReplyListener {
  public:
   using Clock = Deadline::Clock;
   using Found = Result<StampedTransform>;
   using Callback = std::function<void(Found)>;
 
-  struct Wanted {
-    std::string a;
-    std::string b;
-    Query query;
-  };
-
   /// What it needs of the participant. None of these functions may wait, except as stated.
   struct Links {
     /// The owners to ask, according to the current structure. @return as Client::lookup()
-    std::function<Result<Gathering>(const Wanted&)> plan;
-    /// Sends a request once. @return kNotYet if its partition cannot be reached yet.
-    Asking::Send send;
-    std::function<Reply(const Request&)> answer_here;
+    std::function<Result<LookupInProgress>(const WantedLookup&)> plan;
     /// Whether the values pushed here would suffice: then their owners have them, too.
-    std::function<bool(const Wanted&)> was_pushed;
+    std::function<bool(const WantedLookup&)> was_pushed;
     /// The error to return at the deadline: that of the last attempt, or that the result is not
     /// certain.
     std::function<Error(Error last, const Deadline&)> last_word;
@@ -62,8 +53,9 @@ class PendingLookups {
     bool plan_asks = false;
   };
 
-  PendingLookups(Forest& forest, Calls& calls, SharedHints& hints, Links links);
-  ~PendingLookups() { stop(); }
+  PendingLookups(Forest& forest, ReplyTable& replies, RequestLink& link, SharedHints& hints,
+                 Links links);
+  ~PendingLookups() override { stop(); }
   PendingLookups(const PendingLookups&) = delete;
   PendingLookups& operator=(const PendingLookups&) = delete;
 
@@ -72,8 +64,8 @@ class PendingLookups {
   void stop();
 
   /// @param last  why there was no answer so far
-  [[nodiscard]] std::future<Found> add(Wanted wanted, const Deadline& deadline, Error last);
-  [[nodiscard]] std::shared_ptr<OneCall<Found>> add(Wanted wanted, const Deadline& deadline,
+  [[nodiscard]] std::future<Found> add(WantedLookup wanted, const Deadline& deadline, Error last);
+  [[nodiscard]] std::shared_ptr<OneCall<Found>> add(WantedLookup wanted, const Deadline& deadline,
                                                     Error last, OneCall<Found>::Function callback);
 
   /// What plan() would find has changed.
@@ -84,10 +76,10 @@ class PendingLookups {
 
  private:
   struct Lookup {
-    Lookup(Wanted what, const Deadline& by, Error why)
+    Lookup(WantedLookup what, const Deadline& by, Error why)
         : wanted(std::move(what)), deadline(by), last(std::move(why)) {}
 
-    const Wanted wanted;
+    const WantedLookup wanted;
     const Deadline deadline;
     Error last;
     // One of the two gets the answer.
@@ -100,13 +92,14 @@ class PendingLookups {
     std::uint64_t version = 0;                          // of the structure at the last attempt
     bool far = false;                                   // others lacked data then
     bool hurried = false;                               // was asked again for pushed values
-    std::optional<Gathering> gathering;                 // in progress,
+    std::optional<LookupInProgress> plan;               // in progress,
     std::optional<Deadline> until;                      // until this deadline
-    std::optional<Asking> asking;
+    std::optional<PendingRequests> asking;
   };
   using All = std::vector<std::unique_ptr<Lookup>>;
 
   void add(std::unique_ptr<Lookup> lookup);
+  void all_replied() override { wake(urgent_); }
   void wake(std::atomic<bool>& why);
   void run();
   [[nodiscard]] Clock::time_point attend(All& all, bool written);
@@ -122,7 +115,8 @@ class PendingLookups {
   [[nodiscard]] std::uint64_t version() const;
 
   Forest& forest_;
-  Calls& calls_;
+  ReplyTable& replies_;
+  RequestLink& link_;
   SharedHints& hints_;
   const Links links_;
   Callbacks callbacks_;

@@ -33,9 +33,8 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch(const std::string& a, const 
                                                     const WatchOptions& options) {
   if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
   const Deadline deadline = discovery_.call_deadline();
-  const auto names = [&] { return std::vector<std::string>{a, b}; };
-  auto known = requests_.after_asking(deadline, names, OnDemand::kFresh,
-                                      [&] { return structure_.forest.segments(a, b); });
+  auto known = requests_.find(deadline, {a, b}, Task::kFresh,
+                              [&](const Directory&) { return structure_.forest.segments(a, b); });
   if (!known) return tl::unexpected(std::move(known.error()));
   return follow(std::make_shared<WatchedPath>(a, b, options), deadline);
 }
@@ -48,11 +47,9 @@ Result<std::shared_ptr<WatchedPath>> Watcher::watch_edges(const std::vector<std:
                 frames.empty() ? "no edges to watch" : "edges are not a path that can be composed");
   }
   const Deadline deadline = discovery_.call_deadline();
-  const auto names = [&] { return frames; };
   const auto known =
-      requests_.after_asking(deadline, names, OnDemand::kFresh, [&]() -> Result<WatchRoute> {
-        const Lock lock(structure_.mutex);
-        return watch_route(structure_.forest, structure_.directory, frames, {}, 0);
+      requests_.find(deadline, frames, Task::kFresh, [&](const Directory& directory) {
+        return watch_route(structure_.forest, directory, frames, {}, 0);
       });
   if (!known) return tl::unexpected(known.error());
   return follow(std::make_shared<WatchedPath>(frames, options), deadline);
@@ -100,7 +97,7 @@ Result<std::shared_ptr<FollowedPartition>> Watcher::watch_partition(
     return tl::unexpected(std::move(ok.error()));
   }
   const Deadline deadline = discovery_.call_deadline();
-  auto known = requests_.planned(deadline, [&](const Directory& directory) -> Result<void> {
+  auto known = requests_.find(deadline, [&](const Directory& directory) -> Result<void> {
     if (directory.owner(partition)) return {};
     return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
   });
@@ -141,7 +138,7 @@ Result<WatchRoute> Watcher::plan(const WatchedPath& path) {
   // If nobody can say whether the route is still right, the known one must do.
   const auto names =
       path.frames().empty() ? std::vector<std::string>{path.a(), path.b()} : path.frames();
-  const auto known = requests_.know(names, OnDemand::kFresh, Deadline(timeout_));
+  const auto known = requests_.know(names, Task::kFresh, Deadline(timeout_));
   const auto period = period_of(options.rate);
   const Lock lock(structure_.mutex);
   auto route = path.frames().empty()

@@ -4,8 +4,8 @@
 #include <optional>
 #include <unordered_map>
 
-#include "simulation/operation.hpp"
 #include "simulation/process.hpp"
+#include "simulation/running_call.hpp"
 
 namespace tfdude::simulation {
 namespace {
@@ -146,7 +146,7 @@ void Invariants::streamed(const Process& one, const Update& update) {
 }
 
 void Invariants::called(const std::shared_ptr<Process>& caller,
-                        const std::shared_ptr<Operation>& call, const std::string& what,
+                        const std::shared_ptr<RunningCall>& call, const std::string& what,
                         Instant must_end) {
   calls_.emplace(must_end, Call{caller, call, what});
 }

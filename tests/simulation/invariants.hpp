@@ -14,8 +14,8 @@
 
 namespace tfdude::simulation {
 
-class Operation;
 class Process;
+class RunningCall;
 
 /// Reports a state that is not allowed.
 /// @param kind  the rule that is broken: two runs that break the same one fail in the same way
@@ -41,7 +41,7 @@ class Invariants {
   void after(Instant now);
 
   /// A call that must have ended by then, unless its process has ended or hung.
-  void called(const std::shared_ptr<Process>& caller, const std::shared_ptr<Operation>& call,
+  void called(const std::shared_ptr<Process>& caller, const std::shared_ptr<RunningCall>& call,
               const std::string& what, Instant must_end);
 
   /// What a process is about to publish.
@@ -68,7 +68,7 @@ class Invariants {
   };
   struct Call {
     std::weak_ptr<Process> caller;
-    std::weak_ptr<Operation> call;
+    std::weak_ptr<RunningCall> call;
     std::string what;
   };
 

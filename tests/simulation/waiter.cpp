@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "faults/frames.hpp"
-#include "runtime/discovery.hpp"
 #include "simulation/cast.hpp"
 
 namespace tfdude::simulation {
@@ -17,13 +16,7 @@ using faults::base_of;
 // An owner that has no answer yet is asked again.
 constexpr Instant kAskAgain = milliseconds(50);
 
-bool is_structural(Errc code) { return Discovery::may_appear(code) || code == Errc::kUnreachable; }
-
-std::vector<SegmentValues> values_of(const std::vector<Answer>& answers) {
-  std::vector<SegmentValues> values;
-  for (const Answer& answer : answers) values.push_back(std::get<SegmentValues>(answer.reply.body));
-  return values;
-}
+bool is_structural(Errc code) { return may_appear(code) || code == Errc::kUnreachable; }
 
 }  // namespace
 
@@ -67,15 +60,13 @@ bool Waiter::may_remove() const {
 void Waiter::remove() {
   process_->begin(
       "remove what a deputy has",
-      std::make_shared<Operation>(
-          *process_,
-          [this] { return route_remove(process_->forest(), process_->directory(), kHanded); },
-          [self = shared_from_this()](const Result<void>& removed, const auto&) {
-            if (removed) self->process_->world().handed_removed = true;
-            ++self->outcomes_[removed ? "a deputy's frame was removed"
-                                      : "a deputy's frame was not removed"];
-            self->next();
-          }));
+      [this] { return route_remove(process_->forest(), process_->directory(), kHanded); },
+      [self = shared_from_this()](const Result<void>& removed) {
+        if (removed) self->process_->world().handed_removed = true;
+        ++self->outcomes_[removed ? "a deputy's frame was removed"
+                                  : "a deputy's frame was not removed"];
+        self->next();
+      });
 }
 
 Result<LookupPlan> Waiter::route() const {
@@ -104,21 +95,11 @@ void Waiter::attempt() {
   if (world.timeline.now() >= until_) return finish("timeout");
   asks_ = true;
   again_ = false;
-  auto plan = std::make_shared<LookupPlan>();
-  process_->begin("lookup of " + frame_ + ", which waits",
-                  std::make_shared<Operation>(
-                      *process_,
-                      [this, plan]() -> Result<std::vector<Part>> {
-                        auto planned = route();
-                        if (!planned) return tl::unexpected(planned.error());
-                        *plan = *std::move(planned);
-                        return plan->parts;
-                      },
-                      [self = shared_from_this(), plan](const Result<void>& outcome,
-                                                        const std::vector<Answer>& answers) {
-                        self->attempted(outcome ? assemble(*plan, values_of(answers))
-                                                : tl::unexpected(outcome.error()));
-                      }));
+  const auto task = process_->lookup("world", frame_);
+  process_->begin("lookup of " + frame_ + ", which waits", task,
+                  [self = shared_from_this(), task](const Result<void>& outcome) {
+                    self->attempted(outcome.map([&] { return task->X_AB(); }));
+                  });
 }
 
 void Waiter::attempted(const Result<StampedTransform>& X_WB) {

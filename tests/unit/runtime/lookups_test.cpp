@@ -27,7 +27,7 @@ struct Seeker : Rig {
         watcher(
             structure, discovery, requests, *transport, [] { return std::uint64_t{0}; },
             options.timeout),
-        lookups(structure, discovery, requests, *transport, watcher, options.timeout) {}
+        lookups(structure, discovery, requests, watcher, options.timeout) {}
   ~Seeker() override {
     lookups.stop();
     watcher.stop();
