@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -59,7 +60,11 @@ class WaitingLookup {
 
   /// @param last  why there was no answer so far
   WaitingLookup(WantedLookup wanted, const TimeLimit& limit, Error last, Clock::time_point now)
-      : wanted_(std::move(wanted)), limit_(limit), last_(std::move(last)), began_(now) {}
+      : wanted_(std::move(wanted)),
+        limit_(limit),
+        last_(std::move(last)),
+        began_(now),
+        until_(limit) {}
 
   /// @return the answer, if it is finished
   [[nodiscard]] std::optional<Result<StampedTransform>> attend(const Shared& shared,
@@ -81,7 +86,7 @@ class WaitingLookup {
   [[nodiscard]] Answer judge(const Shared& shared, const News& news, Found found, bool far,
                              Clock::time_point now);
   void hurry(const Shared& shared, Clock::time_point now);
-  [[nodiscard]] Clock::time_point next_attempt(const Shared& shared, const News& news, bool far,
+  [[nodiscard]] Clock::time_point next_attempt(const Shared& shared, const News& news,
                                                Clock::time_point now) const;
 
   const WantedLookup wanted_;

@@ -46,10 +46,10 @@ class Discovery {
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
   /// The final error of an operation that failed and is not repeated.
-  [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
+  [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
 
   /// Why a result was not certain when the deadline was over: kTimeout.
-  [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
+  [[nodiscard]] Error undecided(const std::string& what, const TimeLimit& limit);
 
   /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);

@@ -23,21 +23,10 @@ Lookups::Lookups(Structure& structure, Discovery& discovery, Requests& requests,
     : structure_(structure),
       discovery_(discovery),
       requests_(requests),
+      watcher_(watcher),
       timeout_(timeout),
-      pending_(structure.forest, requests.replies(), requests, hints_, links(watcher)) {}
-
-PendingLookups::Links Lookups::links(const Watcher& watcher) {
-  return {[this](const WantedLookup& wanted) { return plan(wanted); },
-          [&watcher](const WantedLookup& wanted) {
-            return watcher.can_answer(wanted.a, wanted.b, wanted.query);
-          },
-          [this](Error last, const Deadline& deadline) {
-            return requests_.last_word(std::move(last), deadline);
-          },
-          [this] { return structure_.clock.now(); },
-          timeout_,
-          requests_.on_demand() != nullptr};
-}
+      pending_(structure.forest, requests.replies(), requests, hints_,
+               static_cast<LookupHost&>(*this), timeout) {}
 
 Result<LookupInProgress> Lookups::plan(const WantedLookup& wanted) {
   if (auto ok = requests_.check_owns_partition(); !ok) return tl::unexpected(std::move(ok.error()));

@@ -3,6 +3,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -20,7 +21,7 @@ namespace tfdude {
 /// Computes the pose of one frame in another, from local data or else from the owners' answers.
 /// Client describes the return values.
 /// @par Thread safety  All functions are thread-safe; local data is read without a lock.
-class Lookups {
+class Lookups final : private LookupHost {
  public:
   /// @param watcher  of values that others push
   /// @param timeout  of one attempt of a waiting lookup
@@ -78,20 +79,30 @@ class Lookups {
   void pushed() { pending_.pushed(); }
 
  private:
+  // LookupHost
+  [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted) override;
+  [[nodiscard]] bool asks_for_frames() const override { return requests_.on_demand() != nullptr; }
+  [[nodiscard]] bool was_pushed(const WantedLookup& wanted) const override {
+    return watcher_.can_answer(wanted.a, wanted.b, wanted.query);
+  }
+  [[nodiscard]] Error last_word(Error last, const TimeLimit& limit) override {
+    return requests_.last_word(std::move(last), limit);
+  }
+  [[nodiscard]] std::optional<Time> clock() const override { return structure_.clock.now(); }
+
   static bool is_of_time(const Error& error) {
     return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
   }
 
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
                                                    const Query& query, const Deadline& deadline);
-  [[nodiscard]] PendingLookups::Links links(const Watcher& watcher);
-  [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted);
   [[nodiscard]] Result<StampedTransform> elsewhere(Handle a, Handle b, const Query& query,
                                                    const Deadline& deadline);
 
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
+  const Watcher& watcher_;
   const Milliseconds timeout_;
   SharedHints hints_;
   PendingLookups pending_;  // last: it uses the other members

@@ -9,12 +9,6 @@
 namespace tfdude {
 namespace {
 
-// Owners are asked again after a quarter of the time waited so far, within these bounds.
-constexpr std::chrono::nanoseconds kAskSoonest = Milliseconds(1);
-constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
-// Minimum interval of requests, for all waiting lookups together.
-constexpr std::chrono::microseconds kAskEvery{250};
-
 // If a thread writes continuously, waiting lookups are checked at most at this interval, and take
 // at most a quarter of a processor: the writer wakes the thread, which costs the writer some
 // microseconds.
@@ -22,27 +16,11 @@ constexpr int kRest = 3;
 constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
-bool is_structural(Errc code) { return may_appear(code) || code == Errc::kUnreachable; }
-
 }  // namespace
 
-bool is_worth_waiting(const Error& error, const Query& query) {
-  switch (error.code) {
-    case Errc::kNotYet:
-    case Errc::kTimeout:
-    case Errc::kNotOwner:
-      return true;
-    case Errc::kTooOld:
-      // For the latest common time: one edge is ahead of the data of another.
-      return !query.at;
-    default:
-      return is_structural(error.code);
-  }
-}
-
 PendingLookups::PendingLookups(Forest& forest, ReplyTable& replies, RequestLink& link,
-                               SharedHints& hints, Links links)
-    : forest_(forest), replies_(replies), link_(link), hints_(hints), links_(std::move(links)) {}
+                               SharedHints& hints, LookupHost& host, Milliseconds timeout)
+    : shared_{forest, replies, link, hints, host, static_cast<ReplyListener*>(this), timeout} {}
 
 void PendingLookups::stop() {
   {
@@ -65,9 +43,9 @@ void PendingLookups::give_up(Lookup& lookup) {
   if (lookup.callback != nullptr) {
     lookup.callback->cancel();
   } else {
-    lookup.promise.set_value(
-        fail(Errc::kTimeout,
-             "the lookup was cancelled, as its client is closed: " + lookup.last.message));
+    lookup.promise.set_value(fail(
+        Errc::kTimeout,
+        "the lookup was cancelled, as its client is closed: " + lookup.waiting.last().message));
   }
 }
 
@@ -116,7 +94,7 @@ void PendingLookups::look_again() {
 }
 
 std::uint64_t PendingLookups::version() const {
-  return forest_.structure_version() + routes_.load();
+  return shared_.forest.structure_version() + routes_.load();
 }
 
 void PendingLookups::run() {
@@ -132,7 +110,8 @@ void PendingLookups::run() {
     lock.unlock();
     if (listens != !all.empty()) {
       listens = !all.empty();
-      forest_.on_commit(listens ? [this] { wake(written_); } : std::function<void()>(), this);
+      shared_.forest.on_commit(listens ? [this] { wake(written_); } : std::function<void()>(),
+                               this);
     }
     const auto begin = Clock::now();
     const auto next = attend(all, written);
@@ -147,122 +126,26 @@ void PendingLookups::run() {
   }
   std::move(all.begin(), all.end(), std::back_inserter(added_));
   lock.unlock();
-  forest_.on_commit(nullptr, this);
+  shared_.forest.on_commit(nullptr, this);
 }
 
 /// @return when there is more to do
 PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written) {
-  count_ = all.size();
   auto next = Clock::time_point::max();
+  const std::size_t waiting = all.size();
   const auto over = [&](const std::unique_ptr<Lookup>& lookup) {
-    if (attend(*lookup, written)) return true;
-    next = std::min({next, lookup->next, lookup->deadline.at()});
+    if (lookup->callback != nullptr && !lookup->callback->waits()) return true;
+    const WaitingLookup::News news{version(), written, waiting};
+    if (auto found = lookup->waiting.attend(shared_, news, Clock::now())) {
+      finish(*lookup, *std::move(found));
+      return true;
+    }
+    next = std::min(next, lookup->waiting.next());
     return false;
   };
   all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
   if (const auto look = callbacks_.look_after(Clock::now())) next = std::min(next, *look);
   return next;
-}
-
-/// Each of the following returns true if the lookup is finished.
-bool PendingLookups::attend(Lookup& lookup, bool written) {
-  if (lookup.callback != nullptr && !lookup.callback->waits()) return true;
-  if (lookup.asking) return go_on_asking(lookup);
-  if (written && lookup.far) hurry(lookup);
-  const auto now = Clock::now();
-  const bool may_be_here = lookup.version != version() || (written && !lookup.far);
-  if (now < lookup.next && !may_be_here && !lookup.deadline.over(now)) return false;
-  return attempt(lookup);
-}
-
-bool PendingLookups::attempt(Lookup& lookup) {
-  lookup.version = version();
-  const WantedLookup& wanted = lookup.wanted;
-  auto here = forest_.lookup(wanted.a, wanted.b, wanted.query);
-  const bool all_held =
-      here || here.error().code == Errc::kNotYet || here.error().code == Errc::kTooOld;
-  if (all_held) return judge(lookup, std::move(here), false);
-  auto plan = links_.plan(wanted);
-  if (!plan) return judge(lookup, tl::unexpected(std::move(plan.error())), links_.plan_asks);
-  if (lookup.deadline.over()) return judge(lookup, tl::unexpected(lookup.last), true);
-  lookup.plan.emplace(*std::move(plan));
-  lookup.until = lookup.deadline.within(links_.timeout);
-  return ask(lookup);
-}
-
-bool PendingLookups::ask(Lookup& lookup) {
-  lookup.asking.emplace(replies_, lookup.plan->parts(), *lookup.until,
-                        static_cast<ReplyListener*>(this));
-  if (const Error* lacking = lookup.asking->answer(link_)) {
-    // No other owner is asked in vain.
-    Error error = *lacking;
-    lookup.asking.reset();
-    return judge(lookup, tl::unexpected(std::move(error)), false);
-  }
-  return go_on_asking(lookup);
-}
-
-bool PendingLookups::go_on_asking(Lookup& lookup) {
-  const auto now = Clock::now();
-  if (!lookup.asking->complete() && !lookup.until->over(now)) {
-    lookup.next = std::min(lookup.asking->send_due(now, link_), lookup.until->at());
-  }
-  if (!lookup.asking->complete()) {
-    if (!lookup.until->over(now)) return false;
-    lookup.asking->give_up();
-    // Their last answer is more informative than the fact that they had no time to repeat it.
-    if (lookup.deadline.over(now) && lookup.last.code != Errc::kTimeout) {
-      lookup.asking.reset();
-      return judge(lookup, tl::unexpected(lookup.last), true);
-    }
-  }
-  auto found = lookup.plan->take(lookup.asking->take_replies(), hints_, now);
-  lookup.asking.reset();
-  return found ? judge(lookup, *std::move(found), true) : ask(lookup);
-}
-
-bool PendingLookups::judge(Lookup& lookup, Found found, bool far) {
-  if (found || !is_worth_waiting(found.error(), lookup.wanted.query)) {
-    finish(lookup, std::move(found));
-    return true;
-  }
-  lookup.last = std::move(found.error());
-  if (lookup.deadline.over()) {
-    finish(lookup, tl::unexpected(links_.last_word(lookup.last, lookup.deadline)));
-    return true;
-  }
-  lookup.far = far;
-  lookup.next = next_attempt(lookup, far);
-  // The data may have come during the request.
-  if (far) hurry(lookup);
-  return false;
-}
-
-/// Owners that have pushed the wanted data are asked again at once.
-void PendingLookups::hurry(Lookup& lookup) {
-  if (lookup.hurried || !links_.was_pushed(lookup.wanted)) return;
-  lookup.hurried = true;
-  lookup.next = Clock::now();
-}
-
-// Missing local data wakes the thread when it comes.
-PendingLookups::Clock::time_point PendingLookups::next_attempt(const Lookup& lookup,
-                                                               bool far) const {
-  if (!far) return lookup.deadline.at();
-  const auto now = Clock::now();
-  const std::chrono::nanoseconds waited = now - lookup.began;
-  std::chrono::nanoseconds pause = waited / 4;
-  const auto today = links_.clock();
-  if (const auto at = lookup.wanted.query.at; at && today) {
-    // Most sources use stamps of a clock that agrees with this one.
-    if (*at > *today) {
-      pause = *at - *today;
-    } else if (*at > *today - waited) {
-      pause = (*today - *at) / 4;
-    }
-  }
-  pause = std::clamp(pause, kAskSoonest, kAskLatest);
-  return now + std::max<std::chrono::nanoseconds>(pause, count_ * kAskEvery);
 }
 
 void PendingLookups::finish(Lookup& lookup, Found found) {

@@ -37,8 +37,8 @@ Result<void> Requests::check_keeps_all(const std::string& what) const {
               "a client that follows only some frames (Options::follow) cannot " + what);
 }
 
-Error Requests::last_word(Error error, const Deadline& deadline) {
-  if (on_demand_ == nullptr) return discovery_.last_word(std::move(error), deadline);
+Error Requests::last_word(Error error, const TimeLimit& limit) {
+  if (on_demand_ == nullptr) return discovery_.last_word(std::move(error), limit);
   return may_appear(error.code) ? discovery_.explained(std::move(error)) : error;
 }
 

@@ -70,7 +70,7 @@ class Requests final : public RequestLink {
   /// @return kInvalidInput if only some frames are kept here
   [[nodiscard]] Result<void> check_keeps_all(const std::string& what) const;
   /// As Discovery::last_word().
-  [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
+  [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
 
   /// Makes a call. @return what it has ended with; also kPartitionTaken; kTimeout, if it was not
   ///   certain in time

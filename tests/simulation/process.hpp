@@ -109,6 +109,7 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
                                         WantedLookup{a, b, query});
   }
   [[nodiscard]] ReplyTable& replies() { return replies_; }
+  [[nodiscard]] SharedHints& hints() { return hints_; }
   /// The process that has replied to a request; 0: none
   [[nodiscard]] std::uint64_t replied_by(const Part& part) const;
   // RequestLink
@@ -219,8 +220,8 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
   std::map<std::uint64_t, Peer> peers_;
   std::map<std::uint32_t, Page> pages_;  // as published last
   std::optional<Presence> presence_;
-  std::vector<std::shared_ptr<RunningCall>> calls_;
   ReplyTable replies_;
+  std::vector<std::shared_ptr<RunningCall>> calls_;
   std::map<std::uint32_t, std::uint64_t> replied_;  // by whom, by the numbers of requests
   SharedHints hints_;
   std::vector<std::weak_ptr<Watch>> watches_;

@@ -108,7 +108,11 @@ void Process::listen(const std::string& partition, std::uint64_t group) {
 void Process::begin(const std::string& what, std::shared_ptr<Task> task, RunningCall::Then then) {
   const auto call = std::make_shared<RunningCall>(*this, std::move(task), std::move(then));
   calls_.push_back(call);
-  world_.invariants.called(shared_from_this(), call, what,
+  const auto over = [weak = std::weak_ptr(call)] {
+    const auto one = weak.lock();
+    return !one || one->over();
+  };
+  world_.invariants.called(shared_from_this(), over, what,
                            world_.timeline.now() + RunningCall::kTimeout + kEndsWithin);
   call->start();
 }

@@ -83,8 +83,9 @@ bool RunningCall::ask() {
 
 bool RunningCall::store() {
   if (!std::exchange(stores_, true)) {
-    caller_.when_stored([self = shared_from_this()](const Result<void>& stored) {
-      if (!std::exchange(self->stores_, false)) return;
+    caller_.when_stored([weak = weak_from_this()](const Result<void>& stored) {
+      const auto self = weak.lock();
+      if (!self || !std::exchange(self->stores_, false)) return;
       self->call_.stored(stored, self->now());
       self->go_on();
     });
@@ -100,8 +101,9 @@ bool RunningCall::store() {
 bool RunningCall::wait_until(Time until) {
   if (until <= now()) return false;
   if (std::exchange(wakes_, until) == until) return true;
-  caller_.later("call", until - now(), [self = shared_from_this(), until] {
-    if (self->wakes_ == until) self->go_on();
+  caller_.later("call", until - now(), [weak = weak_from_this(), until] {
+    const auto self = weak.lock();
+    if (self && self->wakes_ == until) self->go_on();
   });
   return true;
 }
