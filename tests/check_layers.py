@@ -13,7 +13,7 @@ import sys
 import tempfile
 import unittest
 
-LAYERS = ["base", "math", "types", "tree", "partition", "description", "store", "keys", "recording",
+LAYERS = ["base", "math", "types", "tree", "partition", "calls", "description", "store", "keys", "recording",
           "transport", "runtime", "client", "apps", "python"]
 # Use the library as everybody does, and know nothing of each other.
 USERS = ["apps", "python"]
@@ -48,12 +48,12 @@ CONFINED = [
 ]
 # (what, pattern of the include, layers that must do without it)
 BARRED = [
-    ("threads", r"(thread|future|condition_variable)$", ["math", "types", "tree", "partition"]),
-    ("locks and atomics", r"(mutex|shared_mutex|atomic)$", ["math", "types", "partition"]),
-    ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "types", "tree", "partition"]),
+    ("threads", r"(thread|future|condition_variable)$", ["math", "types", "tree", "partition", "calls"]),
+    ("locks and atomics", r"(mutex|shared_mutex|atomic)$", ["math", "types", "partition", "calls"]),
+    ("input and output", r"(iostream|fstream|spdlog/.*)$", ["math", "types", "tree", "partition", "calls"]),
 ]
 CLOCK = re.compile(r"::\s*now\s*\(|\b(clock_gettime|gettimeofday)\b|\btime\s*\(\s*(nullptr|NULL|0)\s*\)")
-CLOCKLESS = ["base", "math", "types", "tree", "partition", "description", "store", "keys",
+CLOCKLESS = ["base", "math", "types", "tree", "partition", "calls", "description", "store", "keys",
              "recording"]
 
 # Runs jobs at the times that they name.

@@ -92,6 +92,12 @@ Result<Part> route_to(const Directory& directory, Owner owner, Request request) 
   return Part{owner, directory.name(owner), std::move(request)};
 }
 
+Result<Part> route_to_partition(const Directory& directory, Request request) {
+  const auto owner = directory.owner(request.id);
+  if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(request.id));
+  return route_to(directory, *owner, std::move(request));
+}
+
 Result<Part> route_add(const Forest& forest, const Directory& directory, const std::string& id,
                        const AddRequest& request, const std::string& partition) {
   if (auto ok = check_new_id(id, "id"); !ok) return tl::unexpected(ok.error());

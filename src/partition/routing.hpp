@@ -35,6 +35,9 @@ struct LookupPlan {
 /// A request to one owner. @return kUnreachable.
 [[nodiscard]] Result<Part> route_to(const Directory& directory, Owner owner, Request request);
 
+/// A request to the partition whose name is its id. @return kUnknownPartition, kUnreachable.
+[[nodiscard]] Result<Part> route_to_partition(const Directory& directory, Request request);
+
 /// @param partition  the new frame's owner; empty: that of its parent
 /// @return kAlreadyExists, kUnknownParent, kUnknownPartition, kInvalidInput, kUnreachable.
 [[nodiscard]] Result<Part> route_add(const Forest& forest, const Directory& directory,

@@ -1,52 +1,25 @@
 #pragma once
 
-#include <algorithm>
-#include <chrono>
-#include <string>
-
-#include "tfdude/base/time.hpp"
+#include "calls/time_limit.hpp"
 
 namespace tfdude {
 
-/// The end of a call's time. Created once, at the start of the call, and passed to everything that
-/// it waits for. Steady clock. A wait beyond the clock's range, such as Milliseconds::max(), never
-/// ends.
-class Deadline {
+/// The time limit of a call that begins now. Created once, at the start of the call, and passed to
+/// everything that it waits for.
+class Deadline : public TimeLimit {
  public:
-  using Clock = std::chrono::steady_clock;
-
-  /// @param wait  time limit of the call; if negative, it has expired
   explicit Deadline(Milliseconds wait, Clock::time_point now = Clock::now())
-      : wait_(std::max(wait, Milliseconds(0))), at_(sum(now, wait_)) {}
+      : TimeLimit(wait, now) {}
 
   /// This deadline, or the one `wait` from now if that is earlier.
   [[nodiscard]] Deadline within(Milliseconds wait, Clock::time_point now = Clock::now()) const {
     const Deadline other(wait, now);
-    return other.at_ < at_ ? other : *this;
+    return other.at() < at() ? other : *this;
   }
 
-  [[nodiscard]] Clock::time_point at() const { return at_; }
-  [[nodiscard]] bool over(Clock::time_point now = Clock::now()) const { return now >= at_; }
-
-  /// The time limit of the call, human-readable: "50 ms".
-  [[nodiscard]] std::string text() const { return std::to_string(wait_.count()) + " ms"; }
-
-  /// The later instant, at most the end of the clock's range.
-  [[nodiscard]] static Clock::time_point sum(Clock::time_point now, Milliseconds wait) {
-    const auto left =
-        std::chrono::floor<Milliseconds>(Clock::time_point::max().time_since_epoch()) -
-        std::chrono::ceil<Milliseconds>(now.time_since_epoch());
-    return wait < left ? now + wait : Clock::time_point::max();
+  [[nodiscard]] bool over(Clock::time_point now = Clock::now()) const {
+    return TimeLimit::over(now);
   }
-
-  /// The sum of two waits, at most the maximum.
-  [[nodiscard]] static Milliseconds sum(Milliseconds a, Milliseconds b) {
-    return a < Milliseconds::max() - b ? a + b : Milliseconds::max();
-  }
-
- private:
-  Milliseconds wait_;
-  Clock::time_point at_;
 };
 
 }  // namespace tfdude

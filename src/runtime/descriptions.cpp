@@ -28,22 +28,12 @@ Reply Descriptions::answer(const Request& request) const {
 
 Result<DescriptionPart> Descriptions::ask(const std::string& partition, std::uint64_t from,
                                           const Deadline& deadline) {
-  return requests_.retry_on_stale_route(
-      deadline,
-      [&](const Directory& directory) -> Result<Part> {
-        const auto owner = directory.owner(partition);
-        if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-        return route_to(directory, *owner, Request{0, partition, DescriptionRequest{from}});
-      },
-      [&](Part& part) -> Result<DescriptionPart> {
-        std::vector<Part> parts{std::move(part)};
-        Reply reply = std::move(requests_.ask(parts, deadline).front());
-        if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
-        auto* answer = std::get_if<DescriptionPart>(&reply.body);
-        if (answer != nullptr) return std::move(*answer);
-        return fail(Errc::kUnsupported, "partition " + quote(partition) +
-                                            " gave another answer than that it was asked for");
-      });
+  auto asked =
+      requests_.ask_partition<DescriptionPart>(partition, DescriptionRequest{from}, deadline);
+  if (!asked) return tl::unexpected(std::move(asked.error()));
+  if (*asked) return **std::move(asked);
+  return fail(Errc::kUnsupported,
+              "partition " + quote(partition) + " gave another answer than that it was asked for");
 }
 
 Result<std::string> Descriptions::of(const std::string& partition, const Deadline& deadline) {

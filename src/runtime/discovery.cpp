@@ -6,6 +6,7 @@
 #include "tfdude/base/time.hpp"
 
 #include "base/mutex.hpp"
+#include "calls/call.hpp"
 
 namespace tfdude {
 namespace {
@@ -25,8 +26,6 @@ Discovery::Discovery(Structure& structure, const Transport& transport, Milliseco
       timeout_(timeout),
       met_by_(Deadline(search_time).at()),
       told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
-
-bool Discovery::may_appear(Errc code) { return is_unknown(code) || code == Errc::kNotConnected; }
 
 bool Discovery::complete() {
   if (complete_.load(std::memory_order_relaxed)) return true;
@@ -71,9 +70,9 @@ Result<void> Discovery::nobody_but_excluded() const {
   return fail(Errc::kNotPermitted, "no partition answers: " + excluded.front());
 }
 
-Error Discovery::last_word(Error error, const Deadline& deadline) {
+Error Discovery::last_word(Error error, const TimeLimit& limit) {
   if (!may_appear(error.code)) return error;
-  return complete() ? explained(std::move(error)) : undecided(error.message, deadline);
+  return complete() ? explained(std::move(error)) : undecided(error.message, limit);
 }
 
 void Discovery::wait_for_change(const Deadline& deadline) {
@@ -103,7 +102,7 @@ Error Discovery::explained(Error error) {
                                   why_absent(*missed)};
 }
 
-Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
+Error Discovery::undecided(const std::string& what, const TimeLimit& limit) {
   std::string missing = std::string("no participant was discovered yet; ") + kHint;
   // Before the lock is taken: the transport reports presences under a lock of its own.
   const bool awaits_presence = transport_.awaits_presence();
@@ -124,7 +123,7 @@ Error Discovery::undecided(const std::string& what, const Deadline& deadline) {
       missing = "more participants may be discovered";
     }
   }
-  return {Errc::kTimeout, what + ", as far as is known after " + deadline.text() + ": " + missing};
+  return {Errc::kTimeout, what + ", as far as is known after " + limit.text() + ": " + missing};
 }
 
 }  // namespace tfdude

@@ -41,33 +41,15 @@ class Discovery {
   /// while others may still be discovered.
   [[nodiscard]] Deadline call_deadline() const;
 
-  /// Whether the cause of an error may still be resolved by discovery.
-  [[nodiscard]] static bool may_appear(Errc code);
-
   /// Waits until complete(). @return kTimeout, naming what was missing; kNotPermitted if keys
   /// exclude all partitions that were discovered.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
-  /// Runs an operation that may fail due to incomplete knowledge, and repeats it until the result
-  /// is certain.
-  /// @return also kTimeout, if it was not certain in time
-  template <class Operation>
-  auto retry_until_known(const Deadline& deadline, Operation operation) -> decltype(operation()) {
-    while (true) {
-      const bool certain = complete();
-      auto result = operation();
-      if (result || !may_appear(result.error().code)) return result;
-      if (certain) return tl::unexpected(explained(std::move(result.error())));
-      if (deadline.over()) return tl::unexpected(undecided(result.error().message, deadline));
-      wait_for_change(deadline);
-    }
-  }
-
   /// The final error of an operation that failed and is not repeated.
-  [[nodiscard]] Error last_word(Error error, const Deadline& deadline);
+  [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
 
   /// Why a result was not certain when the deadline was over: kTimeout.
-  [[nodiscard]] Error undecided(const std::string& what, const Deadline& deadline);
+  [[nodiscard]] Error undecided(const std::string& what, const TimeLimit& limit);
 
   /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);

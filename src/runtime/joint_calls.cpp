@@ -29,15 +29,12 @@ Result<void> JointCalls::update(const JointUpdate& update) {
   if (auto ok = requests_.check_keeps_all("move joints"); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
   if (auto all = discovery_.await(deadline); !all) return all;
-  return requests_.retry_on_stale_route(
-      deadline,
-      [&](const Directory& directory) -> Result<std::vector<Part>> {
-        auto parts = route_joints(directory, update);
-        if (!parts) return parts;
-        if (auto ok = check_reachable(directory, *parts); !ok) return tl::unexpected(ok.error());
-        return parts;
-      },
-      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
+  return requests_.change(deadline, {}, [&](const Directory& directory) {
+    auto parts = route_joints(directory, update);
+    if (!parts) return parts;
+    if (auto ok = check_reachable(directory, *parts); !ok) parts = tl::unexpected(ok.error());
+    return parts;
+  });
 }
 
 Result<void> JointCalls::publish(const JointUpdate& update) {
@@ -45,7 +42,7 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   if (auto ok = requests_.check_keeps_all("move joints"); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
   if (auto all = discovery_.await(deadline); !all) return all;
-  if (auto ok = member_.still_in(); !ok) return ok;
+  if (auto ok = member_.check_owns_partition(); !ok) return ok;
   JointUpdate known{{}, update.stamp};
   Result<void> outcome;
   Result<std::vector<Part>> parts;

@@ -22,91 +22,28 @@ Lookups::Lookups(const Context& context, const WatchClient& watches)
     : structure_(context.structure),
       discovery_(context.discovery),
       requests_(context.requests),
+      watches_(watches),
       timeout_(context.options.timeout),
-      pending_(context.structure.forest, context.requests.calls(), hints_, context.threads,
-               links(context.transport, watches)) {}
+      pending_(context.structure.forest, context.requests.replies(), context.requests, hints_,
+               static_cast<LookupHost&>(*this), context.threads, timeout_) {}
 
-PendingLookups::Links Lookups::links(Transport& transport, const WatchClient& watches) {
-  return {[this](const PendingLookups::Wanted& wanted) { return plan(wanted); },
-          [&transport](const std::string& partition, const Request& request) -> Result<void> {
-            auto sent = transport.send(partition, request, Deadline::Clock::now());
-            if (!sent && sent.error().code == Errc::kTimeout) sent.error().code = Errc::kNotYet;
-            return sent;
-          },
-          [this](const Request& request) { return requests_.answer_here(request); },
-          [&watches](const PendingLookups::Wanted& wanted) {
-            return watches.can_answer(wanted.a, wanted.b, wanted.query);
-          },
-          [this](Error last, const Deadline& deadline) {
-            return requests_.last_word(std::move(last), deadline);
-          },
-          [this] { return structure_.clock.now(); },
-          timeout_,
-          requests_.on_demand() != nullptr};
-}
-
-Result<Gathering> Lookups::plan(const PendingLookups::Wanted& wanted) {
-  if (auto ok = requests_.still_in(); !ok) return tl::unexpected(std::move(ok.error()));
-  const auto& [a, b, query] = wanted;
-  if (auto ok = requests_.know({a, b}, kMaxAge, Deadline(kPatience)); !ok) {
+Result<LookupInProgress> Lookups::plan(const WantedLookup& wanted) {
+  if (auto ok = requests_.check_owns_partition(); !ok) return tl::unexpected(std::move(ok.error()));
+  if (auto ok = requests_.know({wanted.a, wanted.b}, kMaxAge, Deadline(kPatience)); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
   const Lock lock(structure_.mutex);
-  return routed(structure_.directory, a, b, query, hint).map([&, &a = a, &b = b](LookupPlan plan) {
-    return Gathering(std::move(plan), a, b, hint);
-  });
-}
-
-// The age of an instant is a difference of two times, which must be of one clock.
-Result<LookupPlan> Lookups::routed(const Directory& directory, const std::string& a,
-                                   const std::string& b, const Query& query,
-                                   std::optional<Time> hint) const {
-  auto plan = route_lookup(structure_.forest, directory, a, b, query, hint);
-  if (!plan || !query.age_noise_until) return plan;
-  const std::string differs = other_clock(directory, plan->parts);
-  if (differs.empty()) return plan;
-  return fail(Errc::kInvalidInput,
-              "no process noise can be added until another instant: " + differs);
-}
-
-void Lookups::explain(Error& error, const std::vector<Part>& parts) const {
-  const Lock lock(structure_.mutex);
-  const std::string differs = other_clock(structure_.directory, parts);
-  if (!differs.empty()) error.message += "; " + differs;
-}
-
-std::string Lookups::other_clock(const Directory& directory, const std::vector<Part>& parts) const {
-  const ClockKind own = structure_.clock.kind();
-  for (const Part& part : parts) {
-    const auto theirs = part.owner == kHeldHere ? std::nullopt : directory.info(part.owner).clock;
-    if (!theirs || *theirs == own) continue;
-    return "partition " + quote(part.partition) + " uses the " + to_string(*theirs) +
-           " clock, and this participant the " + to_string(own) + " clock";
-  }
-  return {};
+  return LookupInProgress::plan(structure_.forest, structure_.directory, structure_.clock.kind(),
+                                wanted, hints_, Deadline::Clock::now());
 }
 
 Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view b,
                                             const Query& query, const Deadline& deadline) {
-  const std::string start(a);
-  const std::string end(b);
-  const auto hint = query.at ? std::nullopt : hints_.guess(a, b);
-  return requests_.retry_on_stale_route(
-      deadline,
-      [&] {
-        return std::vector<std::string>{start, end};
-      },
-      [&](const Directory& directory) { return routed(directory, start, end, query, hint); },
-      [&](LookupPlan& plan) {
-        Gathering gathering(std::move(plan), start, end, hint);
-        while (true) {
-          auto found = gathering.take(requests_.ask(gathering.parts(), deadline), hints_);
-          if (!found) continue;
-          if (!*found && is_of_time(found->error())) explain(found->error(), gathering.parts());
-          return *std::move(found);
-        }
-      });
+  LookupTask task(structure_.forest, structure_.clock.kind(), hints_,
+                  {std::string(a), std::string(b), query});
+  auto asked = requests_.run(task, deadline);
+  if (!asked) return tl::unexpected(std::move(asked.error()));
+  return std::move(task.X_AB());
 }
 
 Result<StampedTransform> Lookups::elsewhere(Handle a, Handle b, const Query& query,

@@ -3,6 +3,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -10,7 +11,6 @@
 #include "tfdude/types/query.hpp"
 
 #include "runtime/discovery.hpp"
-#include "runtime/gathering.hpp"
 #include "runtime/pending_lookups.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
@@ -21,7 +21,7 @@ namespace tfdude {
 /// Computes the pose of one frame in another, from local data or else from the owners' answers.
 /// Client describes the return values.
 /// @par Thread safety  All functions are thread-safe; local data is read without a lock.
-class Lookups {
+class Lookups final : private LookupHost {
  public:
   /// @param watches  of values that others push
   Lookups(const Context& context, const WatchClient& watches);
@@ -77,29 +77,30 @@ class Lookups {
   void pushed() { pending_.pushed(); }
 
  private:
+  // LookupHost
+  [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted) override;
+  [[nodiscard]] bool asks_for_frames() const override { return requests_.on_demand() != nullptr; }
+  [[nodiscard]] bool was_pushed(const WantedLookup& wanted) const override {
+    return watches_.can_answer(wanted.a, wanted.b, wanted.query);
+  }
+  [[nodiscard]] Error last_word(Error last, const TimeLimit& limit) override {
+    return requests_.last_word(std::move(last), limit);
+  }
+  [[nodiscard]] std::optional<Time> clock() const override { return structure_.clock.now(); }
+
   static bool is_of_time(const Error& error) {
     return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
   }
 
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,
                                                    const Query& query, const Deadline& deadline);
-  [[nodiscard]] PendingLookups::Links links(Transport& transport, const WatchClient& watches);
-  /// As route_lookup(). @return also kInvalidInput if ages are wanted, and clocks differ
-  [[nodiscard]] Result<LookupPlan> routed(const Directory& directory, const std::string& a,
-                                          const std::string& b, const Query& query,
-                                          std::optional<Time> hint) const;
-  /// Adds to an error about data in time that clocks differ.
-  void explain(Error& error, const std::vector<Part>& parts) const;
-  /// Names an owner with another clock than this participant; empty: there is none.
-  [[nodiscard]] std::string other_clock(const Directory& directory,
-                                        const std::vector<Part>& parts) const;
-  [[nodiscard]] Result<Gathering> plan(const PendingLookups::Wanted& wanted);
   [[nodiscard]] Result<StampedTransform> elsewhere(Handle a, Handle b, const Query& query,
                                                    const Deadline& deadline);
 
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
+  const WatchClient& watches_;
   const Milliseconds timeout_;
   SharedHints hints_;
   PendingLookups pending_;  // last: it uses the other members

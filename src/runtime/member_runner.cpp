@@ -150,7 +150,7 @@ Reply MemberRunner::answer(const Request& request) {
 }
 
 Result<void> MemberRunner::release(const std::vector<std::string>& ids, const Deadline& deadline) {
-  if (auto in = still_in(); !in) return in;
+  if (auto in = check_owns_partition(); !in) return in;
   if (auto why = refusal()) return tl::unexpected(*std::move(why));
   Result<void> released;
   input_of_joints([&](Member& member) { released = member.release(ids, wall_clock()); });
@@ -221,7 +221,7 @@ void MemberRunner::say_goodbye() {
   if (last) announce(*last);
 }
 
-Result<void> MemberRunner::still_in() {
+Result<void> MemberRunner::check_owns_partition() {
   if (!out()) return {};
   return fail(Errc::kPartitionTaken,
               with_rules([](const Member& member) { return member.given_up(); }));

@@ -99,7 +99,7 @@ class MemberRunner final : private CommitLoop::Effects {
   /// Whether another process has the partition now.
   [[nodiscard]] bool out() const { return out_.load(std::memory_order_relaxed); }
   /// @return kPartitionTaken if out().
-  [[nodiscard]] Result<void> still_in();
+  [[nodiscard]] Result<void> check_owns_partition();
   /// Calls `use` with the rules, under the structure's lock; for calls without outputs.
   template <class Use>
   auto with_rules(Use use) {

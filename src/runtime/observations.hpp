@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "partition/observing.hpp"
 #include "runtime/context.hpp"
 #include "runtime/requests.hpp"
 
@@ -26,12 +25,6 @@ class Observations {
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
  private:
-  [[nodiscard]] std::string new_source();
-  [[nodiscard]] Result<std::vector<SegmentValues>> values(std::vector<Part>& parts,
-                                                          const Deadline& deadline);
-  [[nodiscard]] Result<ObservedPath> path(ObservePlan& plan, const Deadline& deadline);
-  [[nodiscard]] Result<bool> revise(std::vector<Part> parts, const Deadline& deadline);
-
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;

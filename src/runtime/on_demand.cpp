@@ -42,7 +42,7 @@ OnDemand::OnDemand(Structure& structure, Discovery& discovery, std::vector<std::
 
 Result<bool> OnDemand::know(const std::vector<std::string>& ids, Milliseconds max_age,
                             const Deadline& deadline) {
-  const auto since = max_age == kAnyAge ? Clock::time_point::min() : Clock::now() - max_age;
+  const auto since = max_age == Task::kAnyAge ? Clock::time_point::min() : Clock::now() - max_age;
   FramesRequest request;
   bool some_known = false;
   {
@@ -68,9 +68,9 @@ Result<std::vector<KnownFrame>> OnDemand::followed(const Deadline& deadline) {
   return ask(request, deadline);
 }
 
-void OnDemand::changed(Owner owner, std::uint64_t epoch) {
+void OnDemand::outdate() {
   const Lock lock(structure_.mutex);
-  if (structure_.directory.note_announced_epoch(owner, epoch)) asked_.outdate();
+  asked_.outdate();
 }
 
 Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "calls/call.hpp"
 #include "partition/asked_frames.hpp"
 #include "partition/routing.hpp"
 #include "runtime/deadline.hpp"
@@ -21,10 +22,6 @@ class OnDemand {
  public:
   using Clock = Deadline::Clock;
 
-  /// An answer of any age will do, or none.
-  static constexpr Milliseconds kAnyAge = Milliseconds::max();
-  static constexpr Milliseconds kFresh{0};
-
   struct Links {
     /// @return a reply for each part
     std::function<std::vector<Reply>(std::vector<Part>&, const Deadline&)> ask;
@@ -38,7 +35,7 @@ class OnDemand {
 
   /// Asks for those of the frames that are not known well enough. Afterwards the forest shows them
   /// as the answer did; that some do not exist is not an error.
-  /// @param max_age  of the answers that are used
+  /// @param max_age  as Task::max_age()
   /// @return whether it has just asked for all of them; also kTimeout, kUnreachable, kUnsupported,
   ///   kNotPermitted
   [[nodiscard]] Result<bool> know(const std::vector<std::string>& ids, Milliseconds max_age,
@@ -47,8 +44,8 @@ class OnDemand {
   /// All frames that are followed, and those above them, as of now. @return as know(); kTooMuch
   [[nodiscard]] Result<std::vector<KnownFrame>> followed(const Deadline& deadline);
 
-  /// An owner has acknowledged a change, which its structure shows in this epoch.
-  void changed(Owner owner, std::uint64_t epoch);
+  /// The structure has changed.
+  void outdate();
 
  private:
   [[nodiscard]] Result<std::vector<KnownFrame>> ask(const FramesRequest& request,

@@ -22,7 +22,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       context_{options_, structure_, *transport_, discovery_, member_, requests_, threads_},
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(context_, std::move(partition), *this),
-      requests_(structure_, discovery_, *transport_, own(), follow()),
+      requests_(structure_, discovery_, *transport_, *this, follow()),
       yielding_(context_),
       serving_(context_),
       queries_(context_),
@@ -58,16 +58,9 @@ Result<Streams*> Participant::streams() {
   return &streams_;
 }
 
-Requests::Own Participant::own() {
-  return {[this](const Request& request) {
-            auto reply = answer_query(request);
-            return reply ? *std::move(reply) : member_.answer(request);
-          },
-          [this](const Deadline& deadline) { member_.tell(deadline); },
-          [this](const Request& request, const Deadline& deadline) {
-            return member_.await_stored(request, deadline);
-          },
-          [this] { return member_.still_in(); }};
+Reply Participant::answer_own(const Request& request) {
+  auto reply = answer_query(request);
+  return reply ? *std::move(reply) : member_.answer(request);
 }
 
 Participant::~Participant() {

@@ -33,7 +33,9 @@ namespace tfdude {
 /// message and each request of a client to the part responsible.
 /// @par Thread safety  All functions are thread-safe, except start() and serve(), which are called
 ///   first, by one thread.
-class Participant final : public TransportHandler, private MemberRunner::Listeners {
+class Participant final : public TransportHandler,
+                          private MemberRunner::Listeners,
+                          private OwnPartition {
  public:
   /// @param partition  the partition to own; empty: none
   Participant(TransportPtr transport, std::string partition, const Options& options);
@@ -80,7 +82,7 @@ class Participant final : public TransportHandler, private MemberRunner::Listene
   // TransportHandler
   void on_request(const PeerId& from, const Request& request) override;
   void on_reply(const std::string& from, const Reply& reply) override {
-    requests_.calls().on_reply(from, reply);
+    requests_.replies().on_reply(from, reply);
   }
   void on_update(const Update& update) override;
   void on_joints(const JointUpdate& update) override { joints_.on_joints(update); }
@@ -108,10 +110,20 @@ class Participant final : public TransportHandler, private MemberRunner::Listene
  private:
   // MemberRunner::Listeners
   void on_routes() override;
-  void on_gone(const std::string& partition) override { requests_.calls().on_lost(partition); }
+  void on_gone(const std::string& partition) override { requests_.replies().on_lost(partition); }
   void on_contest() override { yielding_.ask(); }
 
-  [[nodiscard]] Requests::Own own();
+  // OwnPartition
+  [[nodiscard]] Reply answer_own(const Request& request) override;
+  void announce_changes(const Deadline& deadline) override { member_.tell(deadline); }
+  [[nodiscard]] Result<void> await_stored(const Request& request,
+                                          const Deadline& deadline) override {
+    return member_.await_stored(request, deadline);
+  }
+  [[nodiscard]] Result<void> check_owns_partition() override {
+    return member_.check_owns_partition();
+  }
+
   [[nodiscard]] std::optional<Requests::Follow> follow();
   [[nodiscard]] Reply answer_frames(const Request& request);
   /// The reply to a request that changes nothing; empty for other requests.

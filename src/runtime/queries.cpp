@@ -23,31 +23,26 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
     }
     return path;
   };
-  const auto names = [&] { return std::vector<std::string>{std::string(a), std::string(b)}; };
-  return requests_.after_asking(discovery_.call_deadline(), names, OnDemand::kFresh, [&] {
-    const Lock lock(structure_.mutex);
-    return route(structure_.directory);
-  });
+  return requests_.find(discovery_.call_deadline(), {std::string(a), std::string(b)}, Task::kFresh,
+                        route);
 }
 
 Result<Handle> Queries::find(std::string_view id) {
-  const auto names = [&] { return std::vector<std::string>{std::string(id)}; };
-  const auto find = [&]() -> Result<Handle> {
+  const auto find = [&](const Directory&) -> Result<Handle> {
     const auto handle = structure_.forest.find(id);
     if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *handle;
   };
-  return requests_.after_asking(discovery_.call_deadline(), names, OnDemand::kFresh, find);
+  return requests_.find(discovery_.call_deadline(), {std::string(id)}, Task::kFresh, find);
 }
 
 Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline) {
-  const auto names = [&] { return std::vector<std::string>{id}; };
-  const auto find = [&]() -> Result<FrameInfo> {
+  const auto find = [&](const Directory&) -> Result<FrameInfo> {
     auto info = structure_.forest.info(id);
     if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
     return *std::move(info);
   };
-  return requests_.after_asking(deadline, names, OnDemand::kFresh, find);
+  return requests_.find(deadline, {id}, Task::kFresh, find);
 }
 
 // Each is listed after its parent.
@@ -80,8 +75,10 @@ std::vector<KnownFrame> Queries::frames_before() {
     }
   }
   for (Part& owner : owners) {
-    auto known = requests_.ask_list<KnownFrame>(std::move(owner), deadline);
-    if (known && !known->empty()) return *std::move(known);
+    std::vector<Part> parts{std::move(owner)};
+    Reply reply = std::move(requests_.ask(parts, deadline).front());
+    auto* known = std::get_if<std::vector<KnownFrame>>(&reply.body);
+    if (known != nullptr && !known->empty()) return std::move(*known);
   }
   return {};
 }
@@ -152,15 +149,14 @@ std::size_t Queries::own_frames() {
 }
 
 Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
-  const Deadline deadline = discovery_.call_deadline();
-  return requests_.retry_on_stale_route(
-      deadline, [&] { return std::vector<std::string>{id}; },
-      [&](const Directory& directory) -> Result<Part> {
+  auto asked = requests_.ask_one<std::vector<HistoryInfo>>(
+      discovery_.call_deadline(), {id}, [&](const Directory& directory) -> Result<Part> {
         const auto info = structure_.forest.info(id);
         if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
         return route_to(directory, info->owner, Request{0, id, HistoryRequest{}});
-      },
-      [&](Part& part) { return requests_.ask_list<HistoryInfo>(std::move(part), deadline); });
+      });
+  if (!asked) return tl::unexpected(std::move(asked.error()));
+  return std::move(*asked).value_or(std::vector<HistoryInfo>());
 }
 
 Result<std::vector<HistoryInfo>> Queries::histories(const std::string& partition) {
@@ -175,12 +171,10 @@ Result<ClockDifference> Queries::clock_difference(const std::string& partition) 
   const Deadline deadline = discovery_.call_deadline();
   std::optional<ClockDifference> best;
   for (int i = 0; i < kRoundTrips; ++i) {
-    auto part = requests_.planned(deadline, [&](const Directory& directory) -> Result<Part> {
-      const auto owner = directory.owner(partition);
-      if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-      // The part of a description after its end: nothing.
-      constexpr std::uint64_t kEnd = UINT64_MAX;
-      return route_to(directory, *owner, Request{0, partition, DescriptionRequest{kEnd}});
+    // The part of a description after its end: nothing.
+    constexpr std::uint64_t kEnd = UINT64_MAX;
+    auto part = requests_.find(deadline, [&](const Directory& directory) {
+      return route_to_partition(directory, Request{0, partition, DescriptionRequest{kEnd}});
     });
     if (!part) return tl::unexpected(std::move(part.error()));
     std::vector<Part> parts{*std::move(part)};

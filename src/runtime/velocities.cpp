@@ -7,7 +7,9 @@
 
 #include "base/saturating.hpp"
 #include "base/stamp.hpp"
-#include "runtime/gathering.hpp"
+#include "calls/lookup_in_progress.hpp"
+#include "math/mean_velocity.hpp"
+#include "partition/observing.hpp"
 
 namespace tfdude {
 namespace {
@@ -33,6 +35,81 @@ bool is_static(const std::vector<HistoryInfo>& histories) {
   return std::none_of(histories.begin(), histories.end(),
                       [](const HistoryInfo& history) { return history.newest.has_value(); });
 }
+
+// Asks for the edges of a path at both ends of an interval, then which of them are static.
+class EdgesTask final : public Task {
+ public:
+  EdgesTask(const Forest& forest, std::string a, std::string b, Time begin, Time end)
+      : forest_(forest), a_(std::move(a)), b_(std::move(b)), begin_(begin), end_(end) {}
+
+  [[nodiscard]] std::vector<std::string> frames() const override { return {a_, b_}; }
+  [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point) override {
+    auto planned = route_observe(forest_, directory, a_, b_, {}, begin_);
+    if (!planned) return tl::unexpected(std::move(planned.error()));
+    plan_ = *std::move(planned);
+    edges_.clear();
+    parts_ = parts_at(plan_.parts, begin_);
+    std::vector<Part> then = parts_at(plan_.parts, end_);
+    std::move(then.begin(), then.end(), std::back_inserter(parts_));
+    return {};
+  }
+  [[nodiscard]] std::vector<Part>& parts() override { return parts_; }
+  [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point) override {
+    return edges_.empty() ? take_values(std::move(replies)) : take_histories(replies);
+  }
+
+  /// Once it is done.
+  [[nodiscard]] const std::vector<EdgeAtEnds>& edges() const { return edges_; }
+  [[nodiscard]] const ObservePlan& planned() const { return plan_; }
+
+ private:
+  [[nodiscard]] Result<Next> take_values(std::vector<Reply> replies) {
+    auto answers = values_of(std::move(replies));
+    if (!answers) return tl::unexpected(std::move(answers.error()));
+    const auto middle = answers->begin() + static_cast<std::ptrdiff_t>(plan_.parts.size());
+    const auto before = observed_path(plan_, {answers->begin(), middle});
+    if (!before) return tl::unexpected(before.error());
+    const auto after = observed_path(plan_, {middle, answers->end()});
+    if (!after) return tl::unexpected(after.error());
+    for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
+      edges_.push_back({before->edges[k].X_PC, after->edges[k].X_PC, plan_.edges[k].way});
+    }
+    ask_for_histories();
+    return parts_.empty() ? Next::kDone : Next::kAsk;
+  }
+
+  void ask_for_histories() {
+    parts_.clear();
+    same_.clear();
+    for (std::size_t k = 0; k < edges_.size(); ++k) {
+      if (!is_same(edges_[k].before, edges_[k].after)) continue;
+      const FrameInfo& edge = plan_.edges[k].info;
+      const auto owner = std::find_if(plan_.parts.begin(), plan_.parts.end(),
+                                      [&](const Part& part) { return part.owner == edge.owner; });
+      same_.push_back(k);
+      parts_.push_back({edge.owner, owner->partition, Request{0, edge.id, HistoryRequest{}}});
+    }
+  }
+
+  [[nodiscard]] Result<Next> take_histories(const std::vector<Reply>& replies) {
+    for (std::size_t i = 0; i < same_.size(); ++i) {
+      if (const auto* error = std::get_if<Error>(&replies[i].body)) return tl::unexpected(*error);
+      const auto* histories = std::get_if<std::vector<HistoryInfo>>(&replies[i].body);
+      edges_[same_[i]].fixed = histories != nullptr && is_static(*histories);
+    }
+    return Next::kDone;
+  }
+
+  const Forest& forest_;
+  const std::string a_;
+  const std::string b_;
+  const Time begin_;
+  const Time end_;
+  ObservePlan plan_;
+  std::vector<Part> parts_;
+  std::vector<EdgeAtEnds> edges_;
+  std::vector<std::size_t> same_;  // edges with equal values at both ends
+};
 
 }  // namespace
 
@@ -64,77 +141,23 @@ Result<std::optional<Velocities::Interval>> Velocities::interval(const std::stri
                                  " before the clock starts");
 }
 
-Result<void> Velocities::find_fixed(const ObservePlan& plan, std::vector<EdgeAtEnds>& edges,
-                                    const Deadline& deadline) {
-  std::vector<std::size_t> asked;
-  std::vector<Part> parts;
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    if (!is_same(edges[k].before, edges[k].after)) continue;
-    const FrameInfo& edge = plan.edges[k].info;
-    const auto owner = std::find_if(plan.parts.begin(), plan.parts.end(),
-                                    [&](const Part& part) { return part.owner == edge.owner; });
-    asked.push_back(k);
-    parts.push_back({edge.owner, owner->partition, Request{0, edge.id, HistoryRequest{}}});
-  }
-  if (parts.empty()) return {};
-  std::vector<Reply> replies = requests_.ask(parts, deadline);
-  for (std::size_t i = 0; i < asked.size(); ++i) {
-    if (auto* error = std::get_if<Error>(&replies[i].body)) return tl::unexpected(*error);
-    const auto* histories = std::get_if<std::vector<HistoryInfo>>(&replies[i].body);
-    edges[asked[i]].fixed = histories != nullptr && is_static(*histories);
-  }
-  return {};
-}
-
-Result<std::vector<EdgeAtEnds>> Velocities::edges(const ObservePlan& plan, const Interval& interval,
-                                                  const Deadline& deadline) {
-  std::vector<Part> parts = parts_at(plan.parts, interval.begin);
-  std::vector<Part> then = parts_at(plan.parts, interval.end);
-  std::move(then.begin(), then.end(), std::back_inserter(parts));
-  auto answers = values_of(requests_.ask(parts, deadline));
-  if (!answers) return tl::unexpected(std::move(answers.error()));
-  const auto middle = answers->begin() + static_cast<std::ptrdiff_t>(plan.parts.size());
-  const auto before = observed_path(plan, {answers->begin(), middle});
-  if (!before) return tl::unexpected(before.error());
-  const auto after = observed_path(plan, {middle, answers->end()});
-  if (!after) return tl::unexpected(after.error());
-  std::vector<EdgeAtEnds> edges;
-  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
-    edges.push_back({before->edges[k].X_PC, after->edges[k].X_PC, plan.edges[k].way});
-  }
-  if (auto ok = find_fixed(plan, edges, deadline); !ok) return tl::unexpected(ok.error());
-  return edges;
-}
-
 Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b,
                                       const VelocityQuery& query, const Deadline& deadline) {
   const auto interval = this->interval(a, b, query, deadline);
   if (!interval) return tl::unexpected(interval.error());
   if (!*interval) return Velocity{};
   const Interval& ends = **interval;
-  ObservePlan used;
-  const auto edges = requests_.retry_on_stale_route(
-      deadline,
-      [&] {
-        return std::vector<std::string>{a, b};
-      },
-      [&](const Directory& directory) {
-        return route_observe(structure_.forest, directory, a, b, {}, ends.begin);
-      },
-      [&](ObservePlan& plan) {
-        auto found = this->edges(plan, ends, deadline);
-        used = std::move(plan);
-        return found;
-      });
-  if (!edges) return tl::unexpected(edges.error());
+  EdgesTask task(structure_.forest, a, b, ends.begin, ends.end);
+  if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
+  const std::vector<EdgeAtEnds>& edges = task.edges();
   MeanVelocity mean =
-      mean_velocity(*edges, std::chrono::duration<double>(ends.end - ends.begin).count());
+      mean_velocity(edges, std::chrono::duration<double>(ends.end - ends.begin).count());
   Velocity velocity{mean.linear, mean.angular, mean.covariance, ends.begin, ends.end, {}};
   velocity.basis.bound = mean.bound;
   velocity.basis.sources = std::move(mean.sources);
-  for (std::size_t k = 0; k < edges->size(); ++k) {
-    if (!(*edges)[k].before.unspecified && !(*edges)[k].after.unspecified) continue;
-    velocity.basis.unspecified.push_back(used.edges[k].info.id);
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (!edges[k].before.unspecified && !edges[k].after.unspecified) continue;
+    velocity.basis.unspecified.push_back(task.planned().edges[k].info.id);
   }
   velocity.covariance.set_complete(velocity.basis.unspecified.empty());
   return velocity;

@@ -5,8 +5,6 @@
 
 #include "tfdude/types/query.hpp"
 
-#include "math/mean_velocity.hpp"
-#include "partition/observing.hpp"
 #include "runtime/context.hpp"
 #include "runtime/lookups.hpp"
 #include "runtime/requests.hpp"
@@ -33,13 +31,6 @@ class Velocities {
   [[nodiscard]] Result<std::optional<Interval>> interval(const std::string& a, const std::string& b,
                                                          const VelocityQuery& query,
                                                          const Deadline& deadline);
-  /// The edges of the plan at both ends.
-  [[nodiscard]] Result<std::vector<EdgeAtEnds>> edges(const ObservePlan& plan,
-                                                      const Interval& interval,
-                                                      const Deadline& deadline);
-  /// Finds out which of the edges are static.
-  [[nodiscard]] Result<void> find_fixed(const ObservePlan& plan, std::vector<EdgeAtEnds>& edges,
-                                        const Deadline& deadline);
 
   Structure& structure_;
   Requests& requests_;

@@ -26,9 +26,9 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch(const std::string& a, co
                                                         const WatchOptions& options) {
   if (auto ok = check_rate(options.rate); !ok) return tl::unexpected(std::move(ok.error()));
   const Deadline deadline = context_.discovery.call_deadline();
-  const auto names = [&] { return std::vector<std::string>{a, b}; };
-  auto known = context_.requests.after_asking(
-      deadline, names, OnDemand::kFresh, [&] { return context_.structure.forest.segments(a, b); });
+  auto known = context_.requests.find(deadline, {a, b}, Task::kFresh, [&](const Directory&) {
+    return context_.structure.forest.segments(a, b);
+  });
   if (!known) return tl::unexpected(std::move(known.error()));
   return follow(std::make_shared<WatchedPath>(a, b, options, routes_), deadline);
 }
@@ -41,11 +41,9 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
                 frames.empty() ? "no edges to watch" : "edges are not a path that can be composed");
   }
   const Deadline deadline = context_.discovery.call_deadline();
-  const auto names = [&] { return frames; };
-  const auto known = context_.requests.after_asking(
-      deadline, names, OnDemand::kFresh, [&]() -> Result<WatchRoute> {
-        const Lock lock(context_.structure.mutex);
-        return watch_route(context_.structure.forest, context_.structure.directory, frames, {}, 0);
+  const auto known =
+      context_.requests.find(deadline, frames, Task::kFresh, [&](const Directory& directory) {
+        return watch_route(context_.structure.forest, directory, frames, {}, 0);
       });
   if (!known) return tl::unexpected(known.error());
   return follow(std::make_shared<WatchedPath>(frames, options, routes_), deadline);
@@ -79,7 +77,7 @@ Result<std::shared_ptr<WatchedPartition>> WatchClient::watch_partition(
     return tl::unexpected(std::move(ok.error()));
   }
   const Deadline deadline = context_.discovery.call_deadline();
-  auto known = context_.requests.planned(deadline, [&](const Directory& directory) -> Result<void> {
+  auto known = context_.requests.find(deadline, [&](const Directory& directory) -> Result<void> {
     if (directory.owner(partition)) return {};
     return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
   });

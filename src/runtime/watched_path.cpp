@@ -255,8 +255,7 @@ Result<WatchRoute> WatchedPath::route(const Context& context) const {
   const std::uint64_t own_incarnation = context.member.incarnation();
   // If nobody can say whether the route is still right, the known one must do.
   const auto names = frames_.empty() ? std::vector<std::string>{a_, b_} : frames_;
-  const auto known =
-      context.requests.know(names, OnDemand::kFresh, Deadline(context.options.timeout));
+  const auto known = context.requests.know(names, Task::kFresh, Deadline(context.options.timeout));
   const auto period = watch_period(options_.rate);
   Structure& structure = context.structure;
   const Lock lock(structure.mutex);

@@ -10,8 +10,10 @@ namespace {
 // A streamed value has no reply that says that its owner has changed.
 constexpr Milliseconds kMaxAge{1000};
 
+// What must be asked for; nothing if all frames are kept here.
 template <class Edge>
-std::vector<std::string> ids_of(const std::vector<Edge>& edges) {
+std::vector<std::string> ids_of(const std::vector<Edge>& edges, const Requests& requests) {
+  if (requests.on_demand() == nullptr) return {};
   std::vector<std::string> ids;
   ids.reserve(edges.size());
   for (const Edge& edge : edges) ids.push_back(edge.id);
@@ -20,21 +22,12 @@ std::vector<std::string> ids_of(const std::vector<Edge>& edges) {
 
 }  // namespace
 
-Result<void> Writes::change(Part part, const Deadline& deadline) {
-  std::vector<Part> parts{std::move(part)};
-  return requests_.change(parts, deadline);
-}
-
 Result<void> Writes::add(const std::string& id, const AddRequest& request,
                          const std::string& partition) {
-  const Deadline deadline = discovery_.call_deadline();
-  const auto names = [&] { return std::vector<std::string>{request.parent, id}; };
-  auto added = requests_.retry_on_stale_route(
-      deadline, names,
-      [&](const Directory& directory) {
+  auto added = requests_.change(
+      discovery_.call_deadline(), {request.parent, id}, [&](const Directory& directory) {
         return route_add(structure_.forest, directory, id, request, partition);
-      },
-      [&](Part& part) { return change(std::move(part), deadline); });
+      });
   if (added) return added;
   return tl::unexpected(member_.unless_unsaved(std::move(added.error()), id));
 }
@@ -45,13 +38,11 @@ Result<void> Writes::remove(const std::string& id) {
   // All frames below it are removed by name, so all must be known.
   if (auto all = discovery_.await(deadline); !all) return all;
   bool asked = false;
-  auto removed = requests_.retry_on_stale_route(
-      deadline,
-      [&](const Directory& directory) { return route_remove(structure_.forest, directory, id); },
-      [&](std::vector<Part>& parts) {
-        asked = true;
-        return requests_.change(parts, deadline);
-      });
+  auto removed = requests_.change(deadline, {}, [&](const Directory& directory) {
+    auto parts = route_remove(structure_.forest, directory, id);
+    asked = asked || parts;
+    return parts;
+  });
   // Missing at a second attempt: the removal has succeeded.
   if (removed) return removed;
   const bool is_missing = is_elsewhere(removed.error());
@@ -60,25 +51,18 @@ Result<void> Writes::remove(const std::string& id) {
 }
 
 Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
-  const Deadline deadline = discovery_.call_deadline();
-  const auto names = [&] { return std::vector<std::string>{id, request.parent}; };
-  return requests_.retry_on_stale_route(
-      deadline, names,
-      [&](const Directory& directory) {
-        return route_move(structure_.forest, directory, id, request);
-      },
-      [&](Part& part) { return change(std::move(part), deadline); });
+  return requests_.change(discovery_.call_deadline(), {id, request.parent},
+                          [&](const Directory& directory) {
+                            return route_move(structure_.forest, directory, id, request);
+                          });
 }
 
 template <class Edge>
 Result<void> Writes::ask_to_update(const std::vector<Edge>& edges, std::optional<Time> stamp) {
-  const Deadline deadline = discovery_.call_deadline();
-  return requests_.retry_on_stale_route(
-      deadline, [&] { return ids_of(edges); },
-      [&](const Directory& directory) {
-        return route_update(structure_.forest, directory, edges, stamp);
-      },
-      [&](std::vector<Part>& parts) { return requests_.change(parts, deadline); });
+  return requests_.change(discovery_.call_deadline(), ids_of(edges, requests_),
+                          [&](const Directory& directory) {
+                            return route_update(structure_.forest, directory, edges, stamp);
+                          });
 }
 
 Result<void> Writes::update(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
@@ -98,11 +82,9 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   auto updated = structure_.forest.update(edges, stamp);
   if (updated || !is_elsewhere(updated.error())) return updated;
   const Deadline deadline = discovery_.call_deadline();
-  auto parts = requests_.after_asking(
-      deadline, [&] { return ids_of(edges); }, kMaxAge,
-      [&] {
-        const Lock lock(structure_.mutex);
-        return route_publish(structure_.forest, structure_.directory, edges, stamp);
+  auto parts =
+      requests_.find(deadline, ids_of(edges, requests_), kMaxAge, [&](const Directory& directory) {
+        return route_publish(structure_.forest, directory, edges, stamp);
       });
   if (!parts) return tl::unexpected(std::move(parts.error()));
   std::vector<Update> shares;
@@ -116,29 +98,24 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
 }
 
 Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {
-  const Deadline deadline = discovery_.call_deadline();
-  return requests_.retry_on_stale_route(
-      deadline, [&] { return std::vector<std::string>{id}; },
-      [&](const Directory& directory) -> Result<Part> {
+  return requests_.change(
+      discovery_.call_deadline(), {id}, [&](const Directory& directory) -> Result<Part> {
         const auto frame = structure_.forest.info(id);
         if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
         if (auto ok = check_common_errors(correlation.common_errors); !ok) {
           return fail_at("frame " + quote(id), ok.error());
         }
         return route_to(directory, frame->owner, Request{0, id, CorrelateRequest{correlation}});
-      },
-      [&](Part& part) { return change(std::move(part), deadline); });
+      });
 }
 
 Result<void> Writes::forget(const std::string& partition) {
   const Deadline deadline = discovery_.call_deadline();
   // All reachable participants must be told.
   if (auto all = discovery_.await(deadline); !all) return all;
-  auto parts = requests_.planned(
-      deadline, [&](const Directory& directory) { return route_forget(directory, partition); });
-  if (!parts) return tl::unexpected(std::move(parts.error()));
-  if (auto told = requests_.change(*parts, deadline); !told) return told;
-  return member_.forget(partition);
+  auto told = requests_.change(
+      deadline, {}, [&](const Directory& directory) { return route_forget(directory, partition); });
+  return told ? member_.forget(partition) : told;
 }
 
 Result<std::vector<Part>> Writes::route_forget(const Directory& directory,

@@ -40,7 +40,6 @@ class Writes {
   }
 
  private:
-  [[nodiscard]] Result<void> change(Part part, const Deadline& deadline);
   template <class Edge>
   [[nodiscard]] Result<void> ask_to_update(const std::vector<Edge>& edges,
                                            std::optional<Time> stamp);

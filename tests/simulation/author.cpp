@@ -151,18 +151,16 @@ void Author::change_here(const std::shared_ptr<Process>& node, const std::string
   if (const auto* error = std::get_if<Error>(&reply.body)) return end(tl::unexpected(*error));
   node->when_stored(end);
   // Its process may end before.
-  process_->later("node", Operation::kTimeout, [end] { end(fail(Errc::kTimeout, "not stored")); });
+  process_->later("node", RunningCall::kTimeout,
+                  [end] { end(fail(Errc::kTimeout, "not stored")); });
 }
 
-void Author::begin(const std::string& what, Operation::Route route, Then then) {
+void Author::begin(const std::string& what, RunningCall::Route route, Then then) {
   began_ = process_->world().timeline.now();
   by_node_ = false;
-  process_->begin(
-      what, std::make_shared<Operation>(*process_, std::move(route),
-                                        [self = shared_from_this(), what, then = std::move(then)](
-                                            const Result<void>& outcome, const auto&) {
-                                          self->conclude(what, outcome, then);
-                                        }));
+  process_->begin(what, std::move(route),
+                  [self = shared_from_this(), what, then = std::move(then)](
+                      const Result<void>& outcome) { self->conclude(what, outcome, then); });
 }
 
 void Author::conclude(const std::string& what, const Result<void>& outcome, const Then& then) {

@@ -72,7 +72,7 @@ class Author : public std::enable_shared_from_this<Author> {
   void change(const std::string& what, const std::string& owner, const RouteOf& route, Then then);
   void change_here(const std::shared_ptr<Process>& node, const std::string& what,
                    const Request& request, const Then& then);
-  void begin(const std::string& what, Operation::Route route, Then then);
+  void begin(const std::string& what, RunningCall::Route route, Then then);
   void conclude(const std::string& what, const Result<void>& outcome, const Then& then);
   void stream_joint(double position);
   [[nodiscard]] OperationKind draw_kind();

@@ -21,12 +21,6 @@ constexpr std::size_t kFrames = 12;  // of one author at the same time
 
 std::vector<Part> alone(Part part) { return {std::move(part)}; }
 
-std::vector<SegmentValues> values_of(const std::vector<Answer>& answers) {
-  std::vector<SegmentValues> values;
-  for (const Answer& answer : answers) values.push_back(std::get<SegmentValues>(answer.reply.body));
-  return values;
-}
-
 }  // namespace
 
 void Author::add() {
@@ -224,32 +218,18 @@ void Author::forget(const std::string& partition) {
 }
 
 void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
-  auto plan = std::make_shared<LookupPlan>();
+  const auto task = process_->lookup(a, b);
   process_->begin(
-      "lookup of " + b + " in " + a,
-      std::make_shared<Operation>(
-          *process_,
-          [this, a, b, plan]() -> Result<std::vector<Part>> {
-            auto planned = route_lookup(process_->forest(), process_->directory(), a, b);
-            if (!planned) return tl::unexpected(planned.error());
-            *plan = *std::move(planned);
-            return plan->parts;
-          },
-          [self = shared_from_this(), a, b, plan, quiet, began = process_->world().timeline.now()](
-              const Result<void>& outcome, const std::vector<Answer>& answers) {
-            Surroundings& world = self->process_->world();
-            Result<StampedTransform> X_AB = fail(Errc::kTimeout, "");
-            if (outcome) {
-              X_AB = assemble(*plan, values_of(answers));
-            } else {
-              X_AB = tl::unexpected(outcome.error());
-            }
-            const std::string code = X_AB ? "done" : std::string(to_string(X_AB.error().code));
-            ++self->outcomes_["lookup " + code];
-            world.trace(self->prefix_ + " lookup " + a + " " + b + ": " + code);
-            self->judge(a, b, X_AB, quiet, began);
-            if (!quiet) self->next();
-          }));
+      "lookup of " + b + " in " + a, task,
+      [self = shared_from_this(), a, b, task, quiet,
+       began = process_->world().timeline.now()](const Result<void>& outcome) {
+        const auto X_AB = outcome.map([&] { return task->X_AB(); });
+        const std::string code = X_AB ? "done" : std::string(to_string(X_AB.error().code));
+        ++self->outcomes_["lookup " + code];
+        self->process_->world().trace(self->prefix_ + " lookup " + a + " " + b + ": " + code);
+        self->judge(a, b, X_AB, quiet, began);
+        if (!quiet) self->next();
+      });
 }
 
 // A partition that has lost something since the lookup began may be different by now.

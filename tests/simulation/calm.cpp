@@ -50,25 +50,27 @@ std::string frame_of(std::size_t partition, std::size_t number) {
 struct Kind {
   const char* name;
   /// @param owner  the number of the partition concerned
-  Result<std::vector<Part>> (*route)(Process& caller, std::size_t owner);
+  std::shared_ptr<Task> (*task)(Process& caller, std::size_t owner);
 };
 
-Result<std::vector<Part>> add_to(Process& caller, std::size_t owner) {
-  return route_add(caller.forest(), caller.directory(), "added" + std::to_string(owner),
-                   {frame_of(owner, 0), {}}, "")
-      .map([](Part&& part) { return std::vector<Part>{std::move(part)}; });
+std::shared_ptr<Task> add_to(Process& caller, std::size_t owner) {
+  return RunningCall::change([&caller, owner] {
+    return route_add(caller.forest(), caller.directory(), "added" + std::to_string(owner),
+                     {frame_of(owner, 0), {}}, "")
+        .map([](Part&& part) { return std::vector<Part>{std::move(part)}; });
+  });
 }
 
-Result<std::vector<Part>> update_of(Process& caller, std::size_t owner) {
-  return route_update(caller.forest(), caller.directory(),
-                      std::vector<EdgeUpdate>{{"added" + std::to_string(owner), {}}});
+std::shared_ptr<Task> update_of(Process& caller, std::size_t owner) {
+  return RunningCall::change([&caller, owner] {
+    return route_update(caller.forest(), caller.directory(),
+                        std::vector<EdgeUpdate>{{"added" + std::to_string(owner), {}}});
+  });
 }
 
 // Between two neighbours in the chain.
-Result<std::vector<Part>> lookup_in(Process& caller, std::size_t owner) {
-  return route_lookup(caller.forest(), caller.directory(), "added" + std::to_string(owner),
-                      frame_of(owner, 0))
-      .map([](LookupPlan&& plan) { return std::move(plan.parts); });
+std::shared_ptr<Task> lookup_in(Process& caller, std::size_t owner) {
+  return caller.lookup("added" + std::to_string(owner), frame_of(owner, 0));
 }
 
 class Calm {
@@ -212,13 +214,10 @@ class Calm {
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t owner = i * size_.partitions / count;
       const auto caller = processes_[(owner + 1) % size_.partitions];
-      caller->begin(kind.name,
-                    std::make_shared<Operation>(
-                        *caller, [kind, caller, owner] { return kind.route(*caller, owner); },
-                        [this](const Result<void>& outcome, const std::vector<Answer>&) {
-                          ++done_;
-                          if (!outcome) fail_with(outcome.error());
-                        }));
+      caller->begin(kind.name, kind.task(*caller, owner), [this](const Result<void>& outcome) {
+        ++done_;
+        if (!outcome) fail_with(outcome.error());
+      });
       advance(kBetween);
     }
     advance(kQuiet);

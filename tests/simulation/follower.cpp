@@ -54,23 +54,20 @@ void Follower::step() {
   write();
 }
 
-void Follower::begin(const std::string& what, Operation::Route route,
+void Follower::begin(const std::string& what, RunningCall::Route route,
                      std::function<void(const Result<void>&)> then) {
   process_->world().trace(tip() + ": begins to " + what);
   began_ = process_->world().timeline.now();
   process_->begin(
-      what, std::make_shared<Operation>(
-                *process_, std::move(route),
-                [self = shared_from_this(), what, then](const Result<void>& outcome, const auto&) {
-                  const std::string code =
-                      outcome ? "done" : std::string(to_string(outcome.error().code));
-                  self->process_->world().trace(self->tip() + ": " + what + ": " + code);
-                  ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
-                  // What was sent without an answer arrives before what is sent next, or is lost.
-                  if (!outcome) self->rest_ = self->process_->world().network.longest_delay();
-                  then(outcome);
-                  self->next();
-                }));
+      what, std::move(route), [self = shared_from_this(), what, then](const Result<void>& outcome) {
+        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
+        self->process_->world().trace(self->tip() + ": " + what + ": " + code);
+        ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
+        // What was sent without an answer arrives before what is sent next, or is lost.
+        if (!outcome) self->rest_ = self->process_->world().network.longest_delay();
+        then(outcome);
+        self->next();
+      });
 }
 
 // Uses new names of frames, because the state of the former ones is not known.

@@ -64,7 +64,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   void written(std::size_t value);
   [[nodiscard]] std::vector<EdgeUpdate> both(std::size_t value) const;
   void move();
-  void begin(const std::string& what, Operation::Route route,
+  void begin(const std::string& what, RunningCall::Route route,
              std::function<void(const Result<void>&)> then);
   void look();
   void judge(const StampedTransform& X);

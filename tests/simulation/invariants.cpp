@@ -4,7 +4,6 @@
 #include <optional>
 #include <unordered_map>
 
-#include "simulation/operation.hpp"
 #include "simulation/process.hpp"
 
 namespace tfdude::simulation {
@@ -145,18 +144,16 @@ void Invariants::streamed(const Process& one, const Update& update) {
   }
 }
 
-void Invariants::called(const std::shared_ptr<Process>& caller,
-                        const std::shared_ptr<Operation>& call, const std::string& what,
-                        Instant must_end) {
-  calls_.emplace(must_end, Call{caller, call, what});
+void Invariants::called(const std::shared_ptr<Process>& caller, std::function<bool()> over,
+                        const std::string& what, Instant must_end) {
+  calls_.emplace(must_end, Call{caller, std::move(over), what});
 }
 
 void Invariants::after(Instant now) {
   while (!calls_.empty() && calls_.begin()->first < now) {
     const auto late = calls_.extract(calls_.begin()).mapped();
     const auto caller = late.caller.lock();
-    const auto call = late.call.lock();
-    if (!caller || caller->ended() || !call || call->over()) continue;
+    if (!caller || caller->ended() || late.over()) continue;
     if (caller->hung_since(now - kLookAgain)) {
       calls_.emplace(now + kLookAgain, late);
     } else {

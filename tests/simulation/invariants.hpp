@@ -14,7 +14,6 @@
 
 namespace tfdude::simulation {
 
-class Operation;
 class Process;
 
 /// Reports a state that is not allowed.
@@ -41,7 +40,8 @@ class Invariants {
   void after(Instant now);
 
   /// A call that must have ended by then, unless its process has ended or hung.
-  void called(const std::shared_ptr<Process>& caller, const std::shared_ptr<Operation>& call,
+  /// @param over  whether it has
+  void called(const std::shared_ptr<Process>& caller, std::function<bool()> over,
               const std::string& what, Instant must_end);
 
   /// What a process is about to publish.
@@ -68,7 +68,7 @@ class Invariants {
   };
   struct Call {
     std::weak_ptr<Process> caller;
-    std::weak_ptr<Operation> call;
+    std::function<bool()> over;
     std::string what;
   };
 

@@ -262,15 +262,13 @@ void Process::react() {
       react();
     });
   }
-  const auto operations = operations_;
-  for (const auto& one : operations) {
-    if (outcome.stopped) one->on_lost(outcome.stopped->partition);
-    if (outcome.lost) one->on_lost(*outcome.lost);
-    one->look_again();
-  }
-  operations_.erase(std::remove_if(operations_.begin(), operations_.end(),
-                                   [](const auto& one) { return one->over(); }),
-                    operations_.end());
+  if (outcome.stopped) replies_.on_lost(outcome.stopped->partition);
+  if (outcome.lost) replies_.on_lost(*outcome.lost);
+  const auto calls = calls_;
+  for (const auto& one : calls) one->go_on();
+  calls_.erase(
+      std::remove_if(calls_.begin(), calls_.end(), [](const auto& one) { return one->over(); }),
+      calls_.end());
   if (outcome.gave_up) ended_ = true;
   tell_planned(outcome);
   count(outcome);
@@ -309,33 +307,17 @@ void Process::yield() {
   yielding_ = false;
   if (due.empty()) return;
   yielding_ = true;
-  const auto ask_all = [this]() -> Result<std::vector<Part>> {
-    std::vector<Part> parts;
-    for (const Owner owner : directory_.reachable_owners()) {
-      const std::string& name = directory_.name(owner);
-      parts.push_back({owner, name, Request{0, name, RemoveRequest{}}});
-    }
-    return parts;
-  };
-  const auto asked = ask_all();
-  begin("yield",
-        std::make_shared<Operation>(
-            *this, ask_all, [this, due, asked](const Result<void>& outcome, const auto& answers) {
-              bool current = outcome.has_value() && answers.size() == asked->size();
-              for (std::size_t i = 0; current && i < answers.size(); ++i) {
-                const Owner owner = (*asked)[i].owner;
-                current = directory_.epoch(owner) >= answers[i].reply.epoch ||
-                          !directory_.reachable(owner);
-              }
-              yielding_ = false;
-              member_.yield(due, current, wall());
-              react();
-            }));
+  const auto task = std::make_shared<CatchUpTask>();
+  begin("yield", task, [this, due, task](const Result<void>& asked) {
+    yielding_ = false;
+    member_.yield(due, asked && task->caught_up(directory_), wall());
+    react();
+  });
 }
 
 std::size_t Process::open_calls() const {
-  const auto open = std::count_if(operations_.begin(), operations_.end(),
-                                  [](const auto& one) { return !one->over(); });
+  const auto open =
+      std::count_if(calls_.begin(), calls_.end(), [](const auto& one) { return !one->over(); });
   return static_cast<std::size_t>(open) + waiting_.size();
 }
 

@@ -10,15 +10,17 @@
 #include <utility>
 #include <vector>
 
+#include "calls/lookup_in_progress.hpp"
+#include "calls/tasks.hpp"
 #include "partition/claiming.hpp"
 #include "partition/member.hpp"
 #include "simulation/clock.hpp"
 #include "simulation/disk.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/network.hpp"
-#include "simulation/operation.hpp"
 #include "simulation/planned.hpp"
 #include "simulation/pushes.hpp"
+#include "simulation/running_call.hpp"
 #include "simulation/steps.hpp"
 #include "simulation/watch.hpp"
 #include "transport/silence.hpp"
@@ -54,7 +56,7 @@ PeerId peer_of(std::uint64_t process);
 std::uint64_t process_of(const PeerId& peer);
 
 /// One process of a participant: the loops that it runs around its Member, in simulated time.
-class Process : public std::enable_shared_from_this<Process> {
+class Process : public std::enable_shared_from_this<Process>, public RequestLink {
  public:
   /// What a life begins with.
   struct Setting {
@@ -85,7 +87,8 @@ class Process : public std::enable_shared_from_this<Process> {
   void met(std::uint64_t peer);
   void hear(std::uint64_t from, const Sample& sample);
   void on_request(std::uint64_t from, const Request& request);
-  void on_reply(std::uint64_t from, const Reply& reply);
+  /// @param partition  of that process
+  void on_reply(std::uint64_t from, const std::string& partition, const Reply& reply);
   /// @param number  the sender counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
   /// Values of a stream.
@@ -96,14 +99,27 @@ class Process : public std::enable_shared_from_this<Process> {
 
   // ---- calls
   /// @param what  for people
-  void begin(const std::string& what, const std::shared_ptr<Operation>& operation);
-  [[nodiscard]] Reply answer(const Request& request);
+  void begin(const std::string& what, std::shared_ptr<Task> task, RunningCall::Then then);
+  void begin(const std::string& what, RunningCall::Route route, RunningCall::Then then) {
+    begin(what, RunningCall::change(std::move(route)), std::move(then));
+  }
+  [[nodiscard]] std::shared_ptr<LookupTask> lookup(const std::string& a, const std::string& b,
+                                                   const Query& query = {}) {
+    return std::make_shared<LookupTask>(forest_, ClockKind::kSystem, hints_,
+                                        WantedLookup{a, b, query});
+  }
+  [[nodiscard]] ReplyTable& replies() { return replies_; }
+  [[nodiscard]] SharedHints& hints() { return hints_; }
+  /// The process that has replied to a request; 0: none
+  [[nodiscard]] std::uint64_t replied_by(const Part& part) const;
+  // RequestLink
+  [[nodiscard]] Reply answer(const Request& request) override;
+  [[nodiscard]] Result<void> send(const std::string& partition, const Request& request,
+                                  TimeLimit::Clock::time_point until) override;
   /// Forgets an unreachable partition itself.
   [[nodiscard]] Result<void> forget(const std::string& partition);
   /// Reports when all earlier changes are stored, and whether that succeeded.
   void when_stored(std::function<void(const Result<void>&)> then);
-  [[nodiscard]] std::uint32_t next_sequence() { return ++sequence_; }
-  void send(const std::string& partition, const Request& request);
   /// Sends values without a reply.
   template <class Values>
   void stream(const std::string& partition, const Values& update) {
@@ -204,7 +220,10 @@ class Process : public std::enable_shared_from_this<Process> {
   std::map<std::uint64_t, Peer> peers_;
   std::map<std::uint32_t, Page> pages_;  // as published last
   std::optional<Presence> presence_;
-  std::vector<std::shared_ptr<Operation>> operations_;
+  ReplyTable replies_;
+  std::vector<std::shared_ptr<RunningCall>> calls_;
+  std::map<std::uint32_t, std::uint64_t> replied_;  // by whom, by the numbers of requests
+  SharedHints hints_;
   std::vector<std::weak_ptr<Watch>> watches_;
   std::vector<std::weak_ptr<Planned>> planned_;
   std::uint64_t told_structure_ = 0;
@@ -213,7 +232,6 @@ class Process : public std::enable_shared_from_this<Process> {
   std::vector<std::function<void()>> backlog_;
   std::vector<std::function<void(const Result<void>&)>> waiting_;
   std::optional<Error> failure_;
-  std::uint32_t sequence_ = 0;
   Instant born_{};
   Instant looked_{};
   std::uint64_t looks_ = 0;

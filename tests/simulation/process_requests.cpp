@@ -27,19 +27,23 @@ void Process::on_request(std::uint64_t from, const Request& request) {
 
 void Process::reply_to(std::uint64_t peer, const Reply& reply) {
   world_.network.send(*this, peer, &reply,
-                      [from = id(), reply](Process& there) { there.on_reply(from, reply); });
+                      [from = id(), name = partition(), reply](Process& there) {
+                        there.on_reply(from, name, reply);
+                      });
 }
 
-void Process::on_reply(std::uint64_t from, const Reply& reply) {
+void Process::on_reply(std::uint64_t from, const std::string& partition, const Reply& reply) {
   world_.steps.mix(reply.epoch + reply.sequence);
   if (const auto peer = peers_.find(from); peer != peers_.end()) {
     peer->second.heard.replied = true;
     show_life(peer->second);
   }
-  const auto operations = operations_;
-  for (const auto& one : operations) one->on_reply(from, reply);
+  replied_.try_emplace(reply.sequence, from);
+  replies_.on_reply(partition, reply);
+  const auto calls = calls_;
+  for (const auto& one : calls) one->go_on();
   for (const auto& one : watches_) {
-    if (const auto watch = one.lock()) watch->on_reply(reply);
+    if (const auto watch = one.lock()) watch->go_on();
   }
 }
 
@@ -101,11 +105,22 @@ void Process::listen(const std::string& partition, std::uint64_t group) {
   });
 }
 
-void Process::begin(const std::string& what, const std::shared_ptr<Operation>& operation) {
-  operations_.push_back(operation);
-  world_.invariants.called(shared_from_this(), operation, what,
-                           world_.timeline.now() + Operation::kTimeout + kEndsWithin);
-  operation->start();
+void Process::begin(const std::string& what, std::shared_ptr<Task> task, RunningCall::Then then) {
+  const auto call = std::make_shared<RunningCall>(*this, std::move(task), std::move(then));
+  calls_.push_back(call);
+  const auto over = [weak = std::weak_ptr(call)] {
+    const auto one = weak.lock();
+    return !one || one->over();
+  };
+  world_.invariants.called(shared_from_this(), over, what,
+                           world_.timeline.now() + RunningCall::kTimeout + kEndsWithin);
+  call->start();
+}
+
+std::uint64_t Process::replied_by(const Part& part) const {
+  if (part.owner == kHeldHere) return id();
+  const auto by = replied_.find(part.request.sequence);
+  return by != replied_.end() ? by->second : 0;
 }
 
 Reply Process::answer(const Request& request) {
@@ -125,16 +140,16 @@ Result<void> Process::forget(const std::string& partition) {
   return forgotten;
 }
 
-void Process::send(const std::string& partition, const Request& request) {
-  Request sent = request;
-  std::uint32_t first = request.sequence;
-  for (const auto& one : operations_) first = std::min(first, one->first_sequence());
-  sent.awaits_from = first;
+// As that of DDS, it does not tell whether there is anybody.
+Result<void> Process::send(const std::string& partition, const Request& request,
+                           TimeLimit::Clock::time_point) {
   each_server(partition, [&](std::uint64_t peer) {
     peers_[peer].used = world_.timeline.now();
-    world_.network.send(*this, peer, &sent,
-                        [from = id(), sent](Process& there) { there.on_request(from, sent); });
+    world_.network.send(*this, peer, &request, [from = id(), request](Process& there) {
+      there.on_request(from, request);
+    });
   });
+  return {};
 }
 
 void Process::each_server(const std::string& partition,

@@ -56,22 +56,19 @@ void Sampler::step() {
   look_up(any_instant(), false);
 }
 
-void Sampler::begin(const std::string& what, Operation::Route route, Then then) {
+void Sampler::begin(const std::string& what, const std::shared_ptr<Task>& task, Then then) {
   process_->begin(
-      what, std::make_shared<Operation>(
-                *process_, std::move(route),
-                [self = shared_from_this(), what, then](const Result<void>& outcome,
-                                                        const std::vector<Answer>& answers) {
-                  Surroundings& world = self->process_->world();
-                  const std::string code =
-                      outcome ? "done" : std::string(to_string(outcome.error().code));
-                  world.trace(self->frame() + ": " + what + ": " + code);
-                  ++self->outcomes_["sampler: " + what.substr(0, what.find(' ')) + " " + code];
-                  // What was sent without an answer arrives before what is sent next, or is lost.
-                  if (!outcome) self->rest_ = world.network.longest_delay();
-                  then(outcome, answers);
-                  if (!outcome && denies(outcome.error().code)) self->added_ = false;
-                }));
+      what, task,
+      [self = shared_from_this(), what, then = std::move(then)](const Result<void>& outcome) {
+        Surroundings& world = self->process_->world();
+        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
+        world.trace(self->frame() + ": " + what + ": " + code);
+        ++self->outcomes_["sampler: " + what.substr(0, what.find(' ')) + " " + code];
+        // What was sent without an answer arrives before what is sent next, or is lost.
+        if (!outcome) self->rest_ = world.network.longest_delay();
+        then(outcome);
+        if (!outcome && denies(outcome.error().code)) self->added_ = false;
+      });
 }
 
 void Sampler::check(const Samples::Broken& broken) {
@@ -85,17 +82,15 @@ void Sampler::add() {
   streamed_.clear();
   base_ = base_of(random_.index(owners_));
   partition_ = partition_name(random_.index(owners_));
-  begin(
-      "add",
-      [this, id = frame()] {
-        return route_add(process_->forest(), process_->directory(), id,
-                         AddRequest{base_, value_of(0)}, partition_)
-            .map([](Part part) { return std::vector<Part>{std::move(part)}; });
-      },
-      [this](const Result<void>& added, const auto&) {
-        added_ = added.has_value();
-        next();
-      });
+  begin("add", RunningCall::change([this, id = frame()] {
+          return route_add(process_->forest(), process_->directory(), id,
+                           AddRequest{base_, value_of(0)}, partition_)
+              .map([](Part part) { return std::vector<Part>{std::move(part)}; });
+        }),
+        [this](const Result<void>& added) {
+          added_ = added.has_value();
+          next();
+        });
 }
 
 std::vector<EdgeUpdate> Sampler::edge(std::size_t number) const {
@@ -130,23 +125,22 @@ void Sampler::stream(std::size_t number) {
 }
 
 void Sampler::request(std::size_t number) {
-  begin(
-      "sample " + std::to_string(number),
-      [this, number] {
-        return route_update(process_->forest(), process_->directory(), edge(number),
-                            samples_.stamp(number));
-      },
-      [this, number](const Result<void>& updated, const std::vector<Answer>& answers) {
-        if (!answers.empty()) {
-          const std::uint64_t by = answers.front().by;
-          const std::size_t before = samples_.restarts();
-          check(updated ? samples_.taken(number, by)
-                        : samples_.rejected(number, by, updated.error()));
-          if (samples_.restarts() > before) process_->world().count("a history was restarted");
-          if (updated && late_) process_->world().count("a late sample was taken");
-        }
-        next();
-      });
+  const auto task = RunningCall::change([this, number] {
+    return route_update(process_->forest(), process_->directory(), edge(number),
+                        samples_.stamp(number));
+  });
+  begin("sample " + std::to_string(number), task,
+        [this, number, task](const Result<void>& updated) {
+          if (!task->parts().empty()) {
+            const std::uint64_t by = process_->replied_by(task->parts().front());
+            const std::size_t before = samples_.restarts();
+            check(updated ? samples_.taken(number, by)
+                          : samples_.rejected(number, by, updated.error()));
+            if (samples_.restarts() > before) process_->world().count("a history was restarted");
+            if (updated && late_) process_->world().count("a late sample was taken");
+          }
+          next();
+        });
 }
 
 Time Sampler::any_instant() {
@@ -157,37 +151,25 @@ Time Sampler::any_instant() {
 }
 
 void Sampler::look_up(std::optional<Time> at, bool last) {
-  auto plan = std::make_shared<LookupPlan>();
-  begin(
-      at ? "lookup-at " + to_string(*at) : std::string("lookup"),
-      [this, at, plan]() -> Result<std::vector<Part>> {
-        Query query;
-        query.at = at;
-        auto planned =
-            route_lookup(process_->forest(), process_->directory(), base_, frame(), query);
-        if (!planned) return tl::unexpected(planned.error());
-        *plan = *std::move(planned);
-        return plan->parts;
-      },
-      [this, at, plan, last](const Result<void>& outcome, const std::vector<Answer>& answers) {
-        Result<StampedTransform> X = fail(Errc::kTimeout, "");
-        if (outcome) {
-          X = assemble(*plan, {std::get<SegmentValues>(answers.front().reply.body)});
-        } else {
-          X = tl::unexpected(outcome.error());
-        }
-        const std::uint64_t by = answers.empty() ? 0 : answers.front().by;
-        if (by != 0) check(samples_.answered(at, by, X));
-        if (X && X->stamp && !at) see(X->pose.translation().y());
-        if (X && X->stamp && at) process_->world().count("a sample was looked up at an instant");
-        const bool answered =
-            X || X.error().code == Errc::kTooOld || X.error().code == Errc::kNotYet;
-        if (last && !answered) {
-          process_->world().violation("a sampled edge is not found",
-                                      frame() + ": " + X.error().message);
-        }
-        if (!last) next();
-      });
+  Query query;
+  query.at = at;
+  const auto task = process_->lookup(base_, frame(), query);
+  begin(at ? "lookup-at " + to_string(*at) : std::string("lookup"), task,
+        [this, at, task, last](const Result<void>& outcome) {
+          const Result<StampedTransform> X = outcome.map([&] { return task->X_AB(); });
+          const std::uint64_t by =
+              task->parts().empty() ? 0 : process_->replied_by(task->parts().front());
+          if (by != 0) check(samples_.answered(at, by, X));
+          if (X && X->stamp && !at) see(X->pose.translation().y());
+          if (X && X->stamp && at) process_->world().count("a sample was looked up at an instant");
+          const bool answered =
+              X || X.error().code == Errc::kTooOld || X.error().code == Errc::kNotYet;
+          if (last && !answered) {
+            process_->world().violation("a sampled edge is not found",
+                                        frame() + ": " + X.error().message);
+          }
+          if (!last) next();
+        });
 }
 
 void Sampler::see(double value) {

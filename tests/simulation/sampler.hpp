@@ -39,7 +39,7 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   void look_back();
 
  private:
-  using Then = std::function<void(const Result<void>&, const std::vector<Answer>&)>;
+  using Then = RunningCall::Then;
 
   void next();
   void step();
@@ -48,7 +48,7 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   void stream(std::size_t number);
   void request(std::size_t number);
   void look_up(std::optional<Time> at, bool last);
-  void begin(const std::string& what, Operation::Route route, Then then);
+  void begin(const std::string& what, const std::shared_ptr<Task>& task, Then then);
   void see(double value);
   void check(const Samples::Broken& broken);
   [[nodiscard]] std::vector<EdgeUpdate> edge(std::size_t number) const;

@@ -288,7 +288,7 @@ void Verdict::check_samplers() {
 
 void Verdict::await_calls() {
   const auto open = [](const auto& actor) { return actor->process().open_calls() > 0; };
-  for (Instant waited{0}; waited < 2 * Operation::kTimeout; waited += kPoll) {
+  for (Instant waited{0}; waited < 2 * RunningCall::kTimeout; waited += kPoll) {
     calls_.wait(kPoll);
     if (std::none_of(cast_.authors.begin(), cast_.authors.end(), open) &&
         std::none_of(cast_.samplers.begin(), cast_.samplers.end(), open)) {

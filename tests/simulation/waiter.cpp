@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "faults/frames.hpp"
-#include "runtime/discovery.hpp"
 #include "simulation/cast.hpp"
 
 namespace tfdude::simulation {
@@ -14,16 +13,10 @@ namespace {
 using faults::base_edge;
 using faults::base_of;
 
-// An owner that has no answer yet is asked again.
-constexpr Instant kAskAgain = milliseconds(50);
-
-bool is_structural(Errc code) { return Discovery::may_appear(code) || code == Errc::kUnreachable; }
-
-std::vector<SegmentValues> values_of(const std::vector<Answer>& answers) {
-  std::vector<SegmentValues> values;
-  for (const Answer& answer : answers) values.push_back(std::get<SegmentValues>(answer.reply.body));
-  return values;
-}
+// How much later than its time a lookup may end.
+constexpr Instant kEndsWithin = milliseconds(20);
+// No request in progress is repeated less often.
+constexpr milliseconds kRarestRepeat{160};
 
 }  // namespace
 
@@ -52,11 +45,18 @@ void Waiter::step() {
   if (may_remove()) return remove();
   base_ = random_.index(world.plan.owners);
   frame_ = random_.index(3) == 0 ? extra_of(base_) : base_of(base_);
-  until_ = world.timeline.now() + milliseconds(500 + random_.index(8000));
-  waits_ = true;
+  limit_.emplace(milliseconds(500 + random_.index(8000)), now());
   had_to_ = false;
   begin();
-  attempt();
+  if (random_.index(2) == 0) return wait({Errc::kTimeout, "not asked yet"});
+  const auto task = process_->lookup("world", frame_);
+  process_->begin("lookup of " + frame_ + ", which may wait", task,
+                  [self = shared_from_this(), task](const Result<void>& outcome) {
+                    const bool waits = !outcome && is_worth_waiting(outcome.error(), {}) &&
+                                       !self->limit_->over(self->now());
+                    if (waits) return self->wait(outcome.error());
+                    self->end(outcome.map([&] { return task->X_AB(); }));
+                  });
 }
 
 bool Waiter::may_remove() const {
@@ -67,23 +67,26 @@ bool Waiter::may_remove() const {
 void Waiter::remove() {
   process_->begin(
       "remove what a deputy has",
-      std::make_shared<Operation>(
-          *process_,
-          [this] { return route_remove(process_->forest(), process_->directory(), kHanded); },
-          [self = shared_from_this()](const Result<void>& removed, const auto&) {
-            if (removed) self->process_->world().handed_removed = true;
-            ++self->outcomes_[removed ? "a deputy's frame was removed"
-                                      : "a deputy's frame was not removed"];
-            self->next();
-          }));
+      [this] { return route_remove(process_->forest(), process_->directory(), kHanded); },
+      [self = shared_from_this()](const Result<void>& removed) {
+        if (removed) self->process_->world().handed_removed = true;
+        ++self->outcomes_[removed ? "a deputy's frame was removed"
+                                  : "a deputy's frame was not removed"];
+        self->next();
+      });
 }
 
 Result<LookupPlan> Waiter::route() const {
   return route_lookup(process_->forest(), process_->directory(), "world", frame_);
 }
 
+Result<LookupInProgress> Waiter::plan(const WantedLookup& wanted) {
+  return LookupInProgress::plan(process_->forest(), process_->directory(), ClockKind::kSystem,
+                                wanted, process_->hints(), now());
+}
+
 std::string Waiter::plan() const {
-  if (!waits_) return "none";
+  if (lookup_ == nullptr) return "none";
   const auto planned = route();
   if (!planned) return std::string(to_string(planned.error().code));
   std::string text = "asks";
@@ -91,74 +94,67 @@ std::string Waiter::plan() const {
   return text;
 }
 
+TimeLimit::Clock::time_point Waiter::now() const { return process_->world().timeline.steady(); }
+
 void Waiter::renew() {
-  if (asks_) {
-    again_ = true;
-  } else {
-    attempt();
-  }
+  ++told_;
+  attend(true);
 }
 
-void Waiter::attempt() {
-  Surroundings& world = process_->world();
-  if (world.timeline.now() >= until_) return finish("timeout");
-  asks_ = true;
-  again_ = false;
-  auto plan = std::make_shared<LookupPlan>();
-  process_->begin("lookup of " + frame_ + ", which waits",
-                  std::make_shared<Operation>(
-                      *process_,
-                      [this, plan]() -> Result<std::vector<Part>> {
-                        auto planned = route();
-                        if (!planned) return tl::unexpected(planned.error());
-                        *plan = *std::move(planned);
-                        return plan->parts;
-                      },
-                      [self = shared_from_this(), plan](const Result<void>& outcome,
-                                                        const std::vector<Answer>& answers) {
-                        self->attempted(outcome ? assemble(*plan, values_of(answers))
-                                                : tl::unexpected(outcome.error()));
-                      }));
-}
-
-void Waiter::attempted(const Result<StampedTransform>& X_WB) {
-  asks_ = false;
-  Surroundings& world = process_->world();
-  if (X_WB) {
-    const bool right =
-        frame_ != base_of(base_) ||
-        (X_WB->pose.translation() - base_edge(base_).pose.translation()).norm() < 1e-9;
-    if (!right) world.violation("a wrong answer", "a lookup that waited, of " + frame_);
-    return finish(had_to_ ? "done after a while" : "done");
-  }
-  had_to_ = true;
-  if (again_) return attempt();
-  if (is_structural(X_WB.error().code)) {
-    // Without being told of a change it looks again only to give up.
-    const Instant left = until_ - world.timeline.now();
-    return process_->later("give up", std::max(left, Instant(0)),
-                           [self = shared_from_this(), until = until_] {
-                             const bool due = self->waits_ && self->until_ == until;
-                             if (due && !self->asks_) self->finish("timeout");
-                           });
-  }
-  process_->later("ask again", kAskAgain, [self = shared_from_this(), until = until_] {
-    if (self->waits_ && self->until_ == until && !self->asks_) self->attempt();
+void Waiter::all_replied() {
+  process_->later("lookup replies", Instant(0), [self = shared_from_this()] {
+    if (self->lookup_ != nullptr) self->attend(false);
   });
 }
 
-void Waiter::finish(const std::string& how) {
-  waits_ = false;
+void Waiter::wait(Error last) {
+  lookup_ = std::make_shared<WaitingLookup>(wanted(), *limit_, std::move(last), now());
+  begin();
+  Surroundings& world = process_->world();
+  world.invariants.called(
+      process_, [weak = std::weak_ptr(lookup_)] { return weak.expired(); },
+      "lookup of " + frame_ + ", which waits",
+      world.timeline.now() + (limit_->at() - now()) + kEndsWithin);
+  attend(false);
+}
+
+void Waiter::attend(bool written) {
+  WaitingLookup::Shared shared{process_->forest(),
+                               process_->replies(),
+                               *process_,
+                               process_->hints(),
+                               static_cast<LookupHost&>(*this),
+                               static_cast<ReplyListener*>(this),
+                               RunningCall::kTimeout};
+  const WaitingLookup::News news{process_->forest().structure_version() + told_, written, 1};
+  if (auto found = lookup_->attend(shared, news, now())) {
+    lookup_.reset();
+    return end(*found);
+  }
+  had_to_ = had_to_ || lookup_->last().message != "not asked yet";
+  const auto next = lookup_->next();
+  if (std::exchange(wakes_, next) == next) return;
+  process_->later("lookup", next - now(), [self = shared_from_this(), next] {
+    if (self->lookup_ != nullptr && self->wakes_ == next) self->attend(false);
+  });
+}
+
+void Waiter::end(const Result<StampedTransform>& X_WB) {
+  Surroundings& world = process_->world();
+  const bool right = !X_WB || frame_ != base_of(base_) ||
+                     (X_WB->pose.translation() - base_edge(base_).pose.translation()).norm() < 1e-9;
+  if (!right) world.violation("a wrong answer", "a lookup that waited, of " + frame_);
+  const std::string how = !X_WB ? "timeout" : had_to_ ? "done after a while" : "done";
   begin();
   ++outcomes_["waiting lookup " + how];
-  process_->world().trace("a waiting lookup of " + frame_ + ": " + how);
+  world.trace("a waiting lookup of " + frame_ + ": " + how);
   next();
 }
 
 void Waiter::check() {
-  if (waits_ && !asks_ && route()) {
-    process_->world().violation("a lookup waits for nothing", frame_);
-  }
+  if (lookup_ == nullptr || limit_->over(now() + 2 * kRarestRepeat)) return;
+  const bool sleeps = lookup_->next() == limit_->at();
+  if (sleeps && route()) process_->world().violation("a lookup waits for nothing", frame_);
 }
 
 }  // namespace tfdude::simulation

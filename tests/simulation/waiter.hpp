@@ -3,18 +3,23 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "calls/waiting_lookup.hpp"
 #include "simulation/planned.hpp"
 #include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 
 /// A client whose lookups wait, across deaths and returns of owners, until there is an answer or
-/// their time is over. As PendingLookups does, it looks again when the structure, or the set of
-/// reachable partitions, has changed; and regularly only at what it can be asked for again. It also
-/// removes the frame that a deputy has taken over.
-class Waiter : public Planned, public std::enable_shared_from_this<Waiter> {
+/// their time is over. It attends to them as PendingLookups does: when the structure or the set of
+/// reachable partitions has changed, when replies have come, and when they say. It also removes the
+/// frame that a deputy has taken over.
+class Waiter final : public Planned,
+                     private LookupHost,
+                     private ReplyListener,
+                     public std::enable_shared_from_this<Waiter> {
  public:
   /// @param actor  the number by which its operations are counted
   Waiter(std::shared_ptr<Process> process, std::size_t actor);
@@ -33,14 +38,24 @@ class Waiter : public Planned, public std::enable_shared_from_this<Waiter> {
   void step();
   [[nodiscard]] bool may_remove() const;
   void remove();
-  void attempt();
-  void attempted(const Result<StampedTransform>& X_WB);
-  void finish(const std::string& how);
+  void wait(Error last);
+  void attend(bool written);
+  void end(const Result<StampedTransform>& X_WB);
   [[nodiscard]] Result<LookupPlan> route() const;
+  [[nodiscard]] WantedLookup wanted() const { return {"world", frame_, {}}; }
+  [[nodiscard]] TimeLimit::Clock::time_point now() const;
+
+  // LookupHost
+  [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted) override;
+  [[nodiscard]] bool was_pushed(const WantedLookup&) const override { return false; }
+  [[nodiscard]] Error last_word(Error last, const TimeLimit&) override { return last; }
+  [[nodiscard]] std::optional<Time> clock() const override { return process_->wall(); }
+
+  void all_replied() override;
 
   [[nodiscard]] std::string plan() const override;
   [[nodiscard]] bool hears(const Told& told) const override {
-    return waits_ && (told.structure || told.routes);
+    return lookup_ != nullptr && (told.structure || told.routes);
   }
   [[nodiscard]] std::string name() const override { return "a lookup of " + frame_; }
   void renew() override;
@@ -50,11 +65,11 @@ class Waiter : public Planned, public std::enable_shared_from_this<Waiter> {
   testing::Random random_;  // of the current step
   std::size_t base_ = 0;    // whose frame is looked up
   std::string frame_;
-  Instant until_{};
-  bool waits_ = false;   // for the first attempt, or a later one
-  bool asks_ = false;    // an attempt is under way
-  bool again_ = false;   // something has changed meanwhile
-  bool had_to_ = false;  // the first attempt has failed
+  bool had_to_ = false;
+  std::optional<TimeLimit> limit_;
+  std::shared_ptr<WaitingLookup> lookup_;  // once it waits
+  TimeLimit::Clock::time_point wakes_{};   // by the newest of its timers
+  std::uint64_t told_ = 0;                 // how often something has changed
   std::size_t steps_ = 0;
   std::map<std::string, std::size_t> outcomes_;
   bool stopped_ = false;

@@ -19,15 +19,16 @@ void Watch::attend() {
   });
 }
 
+TimeLimit::Clock::time_point Watch::now() const { return process_.world().timeline.steady(); }
+
 void Watch::look() {
+  if (asked_) return;
   path_.collect();
-  const Instant now = process_.world().timeline.now();
-  if (routed_by_ == process_.inputs() && now < renew_at_ && path_.up_to_date()) return;
+  if (routed_by_ == process_.inputs() && now() < renew_at_ && path_.up_to_date()) return;
   auto route = watch_route(process_.forest(), process_.directory(), path_.a(), path_.b(), false,
                            std::chrono::nanoseconds(0), 0);
   if (!route) {
-    const bool goes_on =
-        path_.live() && !path_.is_gone(route.error(), process_.world().timeline.steady());
+    const bool goes_on = path_.live() && !path_.is_gone(route.error(), now());
     if (!goes_on) path_.interrupt(std::move(route.error()));
     routed_by_.reset();
     return;
@@ -37,22 +38,42 @@ void Watch::look() {
     if (path_.live()) process_.world().count("a watched path took another route");
     (void)path_.prepare(*route);
     shown_();
-  } else if (now < renew_at_ && path_.up_to_date()) {
+  } else if (now() < renew_at_ && path_.up_to_date()) {
     return;
   }
-  renew_at_ = now + kRenewEvery;
-  ask(*route);
+  renew_at_ = now() + kRenewEvery;
+  ask(*std::move(route));
 }
 
-void Watch::ask(WatchRoute& route) {
-  asked_.clear();
-  for (std::size_t i = 0; i < route.parts.size(); ++i) {
-    open(route.sources[i]);
-    Part& part = route.parts[i];
-    part.request.sequence = process_.next_sequence();
-    asked_[part.request.sequence] = route.sources[i].group;
-    process_.send(part.partition, part.request);
-  }
+void Watch::ask(WatchRoute route) {
+  for (const WatchRoute::Source& source : route.sources) open(source);
+  route_ = std::move(route);
+  ++asks_;
+  asked_.emplace(process_.replies(), route_->parts, TimeLimit(RunningCall::kTimeout, now()));
+  step();
+}
+
+void Watch::step() {
+  const auto next = asked_->step(now(), process_);
+  if (asked_->complete()) return go_on();
+  process_.later("watch call", next - now(), [weak = weak_from_this(), asks = asks_] {
+    const auto self = weak.lock();
+    if (self && self->asked_ && self->asks_ == asks) self->step();
+  });
+}
+
+void Watch::go_on() {
+  if (!asked_ || !asked_->complete()) return;
+  const std::vector<Reply> replies = asked_->take_replies();
+  asked_.reset();
+  for (std::size_t i = 0; i < replies.size(); ++i) answered(replies[i], route_->sources[i]);
+}
+
+void Watch::answered(const Reply& reply, const WatchRoute::Source& source) {
+  const auto* pushed = std::get_if<PushedValues>(&reply.body);
+  if (pushed != nullptr && pushed->group == source.group) return take(*pushed);
+  const auto* error = std::get_if<Error>(&reply.body);
+  if (!path_.live()) path_.interrupt(error ? *error : Error{Errc::kNotOwner, "another group"});
 }
 
 // DDS matches a reader a moment after its creation; the owner then sends everything again.
@@ -65,15 +86,6 @@ void Watch::open(const WatchRoute::Source& source) {
     self->heard_.insert(source.group);
     self->process_.listen(source.partition, source.group);
   });
-}
-
-void Watch::on_reply(const Reply& reply) {
-  const auto asked = asked_.find(reply.sequence);
-  if (asked == asked_.end()) return;
-  const auto* pushed = std::get_if<PushedValues>(&reply.body);
-  if (pushed != nullptr && pushed->group == asked->second) return take(*pushed);
-  const auto* error = std::get_if<Error>(&reply.body);
-  if (!path_.live()) path_.interrupt(error ? *error : Error{Errc::kNotOwner, "another group"});
 }
 
 // A DDS reader drops a sample that arrives after a later sample of the same writer.

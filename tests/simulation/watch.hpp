@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "calls/pending_requests.hpp"
 #include "runtime/watched_path.hpp"
 #include "simulation/timeline.hpp"
 
@@ -33,25 +34,31 @@ class Watch : public std::enable_shared_from_this<Watch> {
   [[nodiscard]] std::set<std::uint64_t> groups() { return path_.groups({}); }
 
   // ---- input from the process
-  void on_reply(const Reply& reply);
+  /// Replies may have come.
+  void go_on();
   /// @param from  the process that has pushed it; @param number  it counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
 
  private:
   void attend();
   void look();
-  void ask(WatchRoute& route);
+  void ask(WatchRoute route);
+  void step();
+  void answered(const Reply& reply, const WatchRoute::Source& source);
   void open(const WatchRoute::Source& source);
   void take(const PushedValues& pushed);
+  [[nodiscard]] TimeLimit::Clock::time_point now() const;
 
   Process& process_;
   WatchedPath path_;
   const std::function<void()> shown_;
-  std::set<std::uint64_t> opened_;                 // groups; some listen only a moment later
-  std::set<std::uint64_t> heard_;                  // that listen
-  std::map<std::uint32_t, std::uint64_t> asked_;   // groups, by the numbers of requests
+  std::set<std::uint64_t> opened_;        // groups; some listen only a moment later
+  std::set<std::uint64_t> heard_;         // that listen
+  std::optional<WatchRoute> route_;       // whose owners are asked
+  std::optional<PendingRequests> asked_;  // until all have answered
+  std::uint64_t asks_ = 0;
   std::map<std::uint64_t, std::uint64_t> newest_;  // numbers of what was pushed, by process
-  Instant renew_at_{};
+  TimeLimit::Clock::time_point renew_at_{};
   std::optional<std::uint64_t> routed_by_;  // the inputs of the process by which its route is known
 };
 

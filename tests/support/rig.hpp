@@ -30,7 +30,7 @@ namespace tfdude::testing {
 }
 
 /// The objects that most parts of a participant need, connected as Participant does it.
-class Rig {
+class Rig : private OwnPartition {
  public:
   explicit Rig(TransportPtr to, const std::string& partition = "", const Options& with = quick())
       : options(with),
@@ -39,16 +39,10 @@ class Rig {
         discovery(structure, *transport, options.discovery, options.timeout),
         context{options, structure, *transport, discovery, member, requests, threads},
         member(context, partition, heed_),
-        requests(structure, discovery, *transport,
-                 {[this](const Request& request) { return member.answer(request); },
-                  [this](const tfdude::Deadline& deadline) { member.tell(deadline); },
-                  [this](const Request& request, const tfdude::Deadline& deadline) {
-                    return member.await_stored(request, deadline);
-                  },
-                  [this] { return still_in ? still_in() : member.still_in(); }}) {
+        requests(structure, discovery, *transport, static_cast<OwnPartition&>(*this)) {
     REQUIRE(transport->start(ear_));
   }
-  virtual ~Rig() {
+  ~Rig() override {
     member.stop_events();
     threads.callbacks.stop();
     member.stop();
@@ -68,7 +62,7 @@ class Rig {
   const Options options;
   std::function<void()> on_contest;
   std::function<void(const PushedValues&)> pushed;
-  std::function<Result<void>()> still_in;  // else the member's
+  std::function<Result<void>()> owns_partition;  // else the member's
   std::atomic<int> routes{0};
   std::mutex mutex;
   std::vector<std::string> gone;  // partitions; under mutex
@@ -82,7 +76,7 @@ class Rig {
         const std::lock_guard lock(rig_.mutex);
         rig_.gone.push_back(name);
       }
-      rig_.requests.calls().on_lost(name);
+      rig_.requests.replies().on_lost(name);
     }
     void on_contest() override {
       if (rig_.on_contest) rig_.on_contest();
@@ -101,6 +95,16 @@ class Rig {
   Requests requests;
 
  private:
+  [[nodiscard]] Reply answer_own(const Request& request) override { return member.answer(request); }
+  void announce_changes(const tfdude::Deadline& deadline) override { member.tell(deadline); }
+  [[nodiscard]] Result<void> await_stored(const Request& request,
+                                          const tfdude::Deadline& deadline) override {
+    return member.await_stored(request, deadline);
+  }
+  [[nodiscard]] Result<void> check_owns_partition() override {
+    return owns_partition ? owns_partition() : member.check_owns_partition();
+  }
+
   /// Passes on what is received. Not the Rig itself, whose virtual functions change as a class
   /// derived from it is destroyed, while the transport still calls.
   class Ear final : public TransportHandler {
@@ -111,7 +115,7 @@ class Rig {
       if (auto reply = rig_.member.on_request(from, request)) rig_.transport->reply(from, *reply);
     }
     void on_reply(const std::string& from, const Reply& reply) override {
-      rig_.requests.calls().on_reply(from, reply);
+      rig_.requests.replies().on_reply(from, reply);
     }
     void on_update(const Update&) override {}
     void on_joints(const JointUpdate&) override {}

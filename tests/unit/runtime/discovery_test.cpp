@@ -55,7 +55,7 @@ TEST_CASE("discovery: without other participants it is complete after the discov
   REQUIRE(joiner.rig.discovery.await(joiner.rig.deadline()));
   CHECK(Deadline::Clock::now() - before >= 40ms);
   const auto found =
-      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [] { return missing(); });
+      joiner.rig.requests.find(joiner.rig.deadline(), [](const Directory&) { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kUnknownFrame);
   CHECK(found.error().message ==
@@ -67,7 +67,7 @@ TEST_CASE("discovery: no negative answer before all participants are discovered"
   options.discovery = 10s;
   Joiner joiner(options);
   const Deadline soon(20ms);
-  const auto found = joiner.rig.discovery.retry_until_known(soon, [] { return missing(); });
+  const auto found = joiner.rig.requests.find(soon, [](const Directory&) { return missing(); });
   REQUIRE_FALSE(found);
   CHECK(found.error().code == Errc::kTimeout);
   CHECK_THAT(found.error().message, ContainsSubstring("no frame 'hand'") &&
@@ -115,7 +115,7 @@ TEST_CASE("discovery: an operation is repeated until its missing frame has arriv
     joiner.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
   });
   const auto found =
-      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [&]() -> Result<int> {
+      joiner.rig.requests.find(joiner.rig.deadline(), [&](const Directory&) -> Result<int> {
         const bool is_known = joiner.rig.structure.forest.exists("hand");
         ++tries;
         return is_known ? Result<int>(1) : missing();
@@ -129,7 +129,7 @@ TEST_CASE("discovery: an error that more discovery cannot change is returned at 
   Joiner joiner;
   int tries = 0;
   const auto found =
-      joiner.rig.discovery.retry_until_known(joiner.rig.deadline(), [&]() -> Result<int> {
+      joiner.rig.requests.find(joiner.rig.deadline(), [&](const Directory&) -> Result<int> {
         ++tries;
         return fail(Errc::kCycle, "a cycle");
       });

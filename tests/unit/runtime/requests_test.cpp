@@ -29,16 +29,9 @@ constexpr std::uint64_t kFarEpoch = std::uint64_t{1} << 62U;  // that is never r
 
 /// To add "finger" below the hand.
 Result<void> add_finger(Rig& rig, const Deadline& deadline) {
-  return rig.requests.retry_on_stale_route(
-      deadline,
-      [&](const Directory& directory) {
-        return route_add(rig.structure.forest, directory, "finger", AddRequest{"hand", along_x(1)},
-                         "");
-      },
-      [&](Part& part) {
-        std::vector<Part> parts{std::move(part)};
-        return rig.requests.change(parts, deadline);
-      });
+  return rig.requests.change(deadline, {}, [&](const Directory& directory) {
+    return route_add(rig.structure.forest, directory, "finger", AddRequest{"hand", along_x(1)}, "");
+  });
 }
 
 }  // namespace
@@ -93,7 +86,7 @@ TEST_CASE("requests: a request fails with not_owner after a limited number of at
       });
   Rig rig(network.join());
   CHECK(outcome(add_finger(rig, Deadline(30s))) == "not_owner");
-  CHECK(arm.asked() == Requests::kAttempts);
+  CHECK(arm.asked() == Call::kAttempts);
 }
 
 TEST_CASE("requests: an owner that does not know a parent yet is asked until it does") {
@@ -122,7 +115,7 @@ TEST_CASE("requests: a change that is acknowledged but does not arrive is not de
   REQUIRE(rig.discovery.await(Deadline(10s)));
   CHECK(outcome(add_finger(rig, Deadline(20ms))) == "ok");
   CHECK_FALSE(rig.discovery.complete());
-  CHECK(outcome(rig.requests.after_discovery(Deadline(10ms), []() -> Result<int> {
+  CHECK(outcome(rig.requests.find(Deadline(10ms), [](const Directory&) -> Result<int> {
           return fail(Errc::kUnknownFrame, "no frame 'finger'");
         })) == "timeout");
 }
@@ -131,7 +124,7 @@ TEST_CASE("requests: a process that lost its partition sends no requests") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   Rig rig(network.join());
-  rig.still_in = [] { return fail(Errc::kPartitionTaken, "served by another process"); };
+  rig.owns_partition = [] { return fail(Errc::kPartitionTaken, "served by another process"); };
   CHECK(outcome(add_finger(rig, Deadline(10s))) == "partition_taken");
   CHECK(arm.asked() == 0);
 }

@@ -161,7 +161,7 @@ TEST_CASE("member runner: a participant without a partition stores and rejects n
   LoopbackNetwork network;
   Rig rig(network.join());
   CHECK(rig.member.partition() == nullptr);
-  CHECK(rig.member.still_in());
+  CHECK(rig.member.check_owns_partition());
   rig.member.tell(Deadline(1s));
   const Error error{Errc::kUnknownFrame, "no frame 'hand'"};
   CHECK(rig.member.unless_unsaved(error, "hand").message == error.message);
@@ -185,8 +185,9 @@ TEST_CASE("member runner: an owner's own updates do not wait for the disk") {
   std::future<Result<void>> change;
   if (structural) {
     change = std::async(std::launch::async, [&] {
-      std::vector<Part> parts{{kHeldHere, "arm", {1, "tool", AddRequest{"hand", {}}}}};
-      return owner.requests.change(parts, Deadline(20s));
+      return owner.requests.change(Deadline(20s), {}, [](const Directory&) -> Result<Part> {
+        return Part{kHeldHere, "arm", {1, "tool", AddRequest{"hand", {}}}};
+      });
     });
   } else {
     REQUIRE(owner.structure.forest.update("hand", along_x(1)));

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,10 +13,18 @@
 
 namespace tfdude {
 
+/// Told that all replies of a call have come, by the thread that brought the last one, which holds
+/// no lock; must not block. Must outlive the calls and the threads that bring replies.
+class ReplyListener {
+ public:
+  virtual ~ReplyListener() = default;
+  virtual void all_replied() = 0;
+};
+
 /// Requests that wait for their replies. A call asks several partitions at once and waits for all.
 /// @par Thread safety  All functions are thread-safe; a Call belongs to the thread that waits for
 ///   it.
-class Calls {
+class ReplyTable {
  public:
   using Clock = std::chrono::steady_clock;
 
@@ -27,13 +34,12 @@ class Calls {
     std::optional<Reply> reply;
   };
 
-  /// Registered with Calls from its construction until its destruction.
+  /// Registered with the table from its construction until its destruction.
   class Call {
    public:
-    /// @param arrived  called once all replies have come, by the thread that brought the last one,
-    ///   without a lock; possibly also after the destruction of this
-    Call(Calls& calls, const std::vector<std::string>& partitions,
-         std::function<void()> arrived = {});
+    /// @param listener  null: the call is waited for. It may be told after the destruction of this.
+    Call(ReplyTable& table, const std::vector<std::string>& partitions,
+         ReplyListener* listener = nullptr);
     ~Call();
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
@@ -53,14 +59,14 @@ class Calls {
     void give_up(std::size_t entry, Error error);
 
    private:
-    friend class Calls;
+    friend class ReplyTable;
     [[nodiscard]] bool complete() const;
 
-    Calls& calls_;
+    ReplyTable& table_;
     std::vector<Entry> entries_;
     std::uint64_t awaits_from_ = 0;
     Condition* arrived_;
-    const std::function<void()> tell_;
+    ReplyListener* const listener_;
   };
 
   /// A reply has come. Dropped if it is unknown, repeated, or of another partition than was asked.

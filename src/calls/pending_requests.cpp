@@ -1,4 +1,4 @@
-#include "runtime/asking.hpp"
+#include "calls/pending_requests.hpp"
 
 #include <algorithm>
 #include <string>
@@ -24,10 +24,12 @@ std::vector<std::string> asked(const std::vector<Part>& parts) {
 
 }  // namespace
 
-Asking::Asking(Calls& calls, std::vector<Part>& parts, std::function<void()> arrived)
+PendingRequests::PendingRequests(ReplyTable& table, std::vector<Part>& parts,
+                                 const TimeLimit& limit, ReplyListener* listener)
     : parts_(parts),
+      limit_(limit),
       replies_(parts.size()),
-      call_(calls, asked(parts), std::move(arrived)),
+      call_(table, asked(parts), listener),
       pause_(kFirstRepeat) {
   for (Part& part : parts_) {
     if (part.owner == kHeldHere) continue;
@@ -37,55 +39,77 @@ Asking::Asking(Calls& calls, std::vector<Part>& parts, std::function<void()> arr
   }
 }
 
-Asking::Clock::time_point Asking::send_due(Clock::time_point now, const Send& send) {
-  if (now < due_) return due_;
-  for (std::size_t i = 0; i < requests_.size(); ++i) {
-    if (call_.waits(i)) this->send(i, send);
+PendingRequests::Clock::time_point PendingRequests::step(Clock::time_point now, RequestLink& link) {
+  if (sent_ > 0 && limit_.over(now) && !has_unsent()) {
+    give_up();
+    return now;
   }
-  if (sent_++ > 0) pause_ = std::min(2 * pause_, kLastRepeat);
-  return due_ = Clock::now() + pause_;
+  (void)send_due(now, link);
+  (void)answer(link);
+  return send_unsent(now, link) ? now : std::min(due_, limit_.at());
 }
 
-bool Asking::send_unsent(const Send& send) {
+bool PendingRequests::has_unsent() const {
+  for (std::size_t i = 0; i < requests_.size(); ++i) {
+    if (requests_[i].unsent && call_.waits(i)) return true;
+  }
+  return false;
+}
+
+PendingRequests::Clock::time_point PendingRequests::send_due(Clock::time_point now,
+                                                             RequestLink& link) {
+  if (now < due_) return due_;
+  for (std::size_t i = 0; i < requests_.size(); ++i) {
+    if (call_.waits(i)) send(i, now, now, link);
+  }
+  if (sent_++ > 0) pause_ = std::min(2 * pause_, kLastRepeat);
+  return due_ = now + pause_;
+}
+
+/// @return whether any is left
+bool PendingRequests::send_unsent(Clock::time_point now, RequestLink& link) {
   bool left = false;
+  auto until = std::min(now + kTurn, limit_.at());
   for (std::size_t i = 0; i < requests_.size(); ++i) {
     if (!requests_[i].unsent || !call_.waits(i)) continue;
-    this->send(i, send);
+    send(i, now, std::exchange(until, now), link);
     left = left || requests_[i].unsent;
     if (requests_[i].unsent) continue;
     // Its first repeats come soon, however long it could not be sent: it may have been too early.
     pause_ = kFirstRepeat;
-    due_ = std::min(due_, Clock::now() + pause_);
+    due_ = std::min(due_, now + pause_);
   }
   return left;
 }
 
-void Asking::send(std::size_t i, const Send& send) {
-  auto sent = send(call_.entries()[i].partition, *requests_[i].request);
-  requests_[i].unsent = !sent && sent.error().code == Errc::kNotYet;
+void PendingRequests::send(std::size_t i, Clock::time_point now, Clock::time_point until,
+                           RequestLink& link) {
+  auto sent = link.send(call_.entries()[i].partition, *requests_[i].request, until);
+  requests_[i].unsent = !sent && sent.error().code == Errc::kTimeout && !limit_.over(now);
   if (!sent && !requests_[i].unsent) call_.give_up(i, std::move(sent.error()));
 }
 
-void Asking::give_up(const Deadline& deadline) {
+void PendingRequests::give_up() {
   for (std::size_t i = 0; i < requests_.size(); ++i) {
     if (!call_.waits(i)) continue;
     call_.give_up(i, Error{Errc::kTimeout, "partition " + quote(call_.entries()[i].partition) +
-                                               " did not answer within " + deadline.text() +
+                                               " did not answer within " + limit_.text() +
                                                " (asked " + std::to_string(sent_) + " times)"});
   }
 }
 
-const Error* Asking::answer(const std::function<Reply(const Request& request)>& here) {
+const Error* PendingRequests::answer(RequestLink& link) {
+  if (std::exchange(answered_, true)) return nullptr;
   const Error* first = nullptr;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (parts_[i].owner != kHeldHere) continue;
-    replies_[i] = here(parts_[i].request);
+    replies_[i] = link.answer(parts_[i].request);
     if (first == nullptr) first = std::get_if<Error>(&replies_[i].body);
   }
   return first;
 }
 
-std::vector<Reply> Asking::take_replies() {
+std::vector<Reply> PendingRequests::take_replies() {
   std::size_t entry = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (parts_[i].owner != kHeldHere) replies_[i] = *call_.entries()[entry++].reply;

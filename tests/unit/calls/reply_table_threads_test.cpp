@@ -2,21 +2,21 @@
 #include <thread>
 #include <vector>
 
-#include "runtime/calls.hpp"
+#include "calls/reply_table.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude {
 namespace {
 
 // Far enough that it is only reached where a reply got lost.
-Calls::Clock::time_point far() { return Calls::Clock::now() + std::chrono::seconds(60); }
+ReplyTable::Clock::time_point far() { return ReplyTable::Clock::now() + std::chrono::seconds(60); }
 
 TEST_CASE("calls: a waiting call is woken by its last reply") {
-  Calls calls;
-  Calls::Call call(calls, {"a", "b"});
-  std::thread replier([&calls, &entries = call.entries()] {
-    for (const Calls::Entry& entry : entries) {
-      calls.on_reply(entry.partition, {entry.sequence, 0, Done{}});
+  ReplyTable table;
+  ReplyTable::Call call(table, {"a", "b"});
+  std::thread replier([&table, &entries = call.entries()] {
+    for (const ReplyTable::Entry& entry : entries) {
+      table.on_reply(entry.partition, {entry.sequence, 0, Done{}});
     }
   });
   CHECK(call.wait_until(far()));
@@ -24,9 +24,9 @@ TEST_CASE("calls: a waiting call is woken by its last reply") {
 }
 
 TEST_CASE("calls: a waiting call is woken by the loss of the last partition it waits for") {
-  Calls calls;
-  Calls::Call call(calls, {"a"});
-  std::thread loser([&calls] { calls.on_lost("a"); });
+  ReplyTable table;
+  ReplyTable::Call call(table, {"a"});
+  std::thread loser([&table] { table.on_lost("a"); });
   CHECK(call.wait_until(far()));
   loser.join();
 }
@@ -34,16 +34,16 @@ TEST_CASE("calls: a waiting call is woken by the loss of the last partition it w
 TEST_CASE("calls: many concurrent calls each get their own replies") {
   constexpr std::uint32_t kCalls = 2000;
   constexpr std::uint32_t kCallers = 3;
-  Calls calls;
+  ReplyTable table;
   std::atomic<std::uint32_t> running{kCallers};
   std::atomic<std::uint32_t> wrong{0};
   std::vector<std::thread> threads;
   for (std::uint32_t i = 0; i < kCallers; ++i) {
     threads.emplace_back([&] {
       for (std::uint32_t n = 0; n < kCalls; ++n) {
-        Calls::Call call(calls, {"a", "b"});
+        ReplyTable::Call call(table, {"a", "b"});
         if (!call.wait_until(far())) ++wrong;
-        for (const Calls::Entry& entry : call.entries()) {
+        for (const ReplyTable::Entry& entry : call.entries()) {
           if (entry.reply->sequence != entry.sequence || entry.reply->epoch != entry.sequence) {
             ++wrong;
           }
@@ -56,8 +56,8 @@ TEST_CASE("calls: many concurrent calls each get their own replies") {
   std::thread replier([&] {
     while (running > 0) {
       for (std::uint32_t n = 1; n <= 2 * kCallers * kCalls && running > 0; ++n) {
-        calls.on_reply("a", {n, n, Done{}});
-        calls.on_reply("b", {n, n, Done{}});
+        table.on_reply("a", {n, n, Done{}});
+        table.on_reply("b", {n, n, Done{}});
       }
     }
   });

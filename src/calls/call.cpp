@@ -1,0 +1,175 @@
+#include "calls/call.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "partition/requests.hpp"
+
+namespace tfdude {
+namespace {
+
+// Before a call that was denied is planned again; then twice as long.
+constexpr Milliseconds kFirstPause{5};
+
+}  // namespace
+
+bool may_appear(Errc code) { return is_unknown(code) || code == Errc::kNotConnected; }
+
+bool Call::denies_plan(Errc code) {
+  return code == Errc::kAlreadyExists || code == Errc::kUnknownParent || code == Errc::kCycle;
+}
+
+Call::Call(ReplyTable& table, Task& task, const TimeLimit& limit, bool asks_for_frames)
+    : table_(table),
+      task_(task),
+      limit_(limit),
+      keeps_all_(!asks_for_frames),
+      asks_(asks_for_frames && !task.frames().empty()),
+      state_(asks_ ? State::kKnow : State::kPlan),
+      max_age_(task.max_age()),
+      pause_(kFirstPause) {}
+
+void Call::known(Result<bool> fresh) {
+  if (!fresh) return fail(std::move(fresh.error()));
+  fresh_ = *fresh || max_age_ == Task::kFresh;
+  // Whatever failed with an earlier answer may succeed with a fresh one.
+  max_age_ = Task::kFresh;
+  state_ = State::kPlan;
+}
+
+void Call::plan(const Directory& directory, std::uint64_t version, bool certain,
+                Clock::time_point now) {
+  version_ = version;
+  auto planned = task_.plan(directory, now);
+  if (planned) return ask();
+  const Errc code = planned.error().code;
+  const bool may_exist = may_appear(code);
+  // The answer of others is certain about frames, but not about partitions.
+  const bool known = !may_exist || certain || (asks_ && code != Errc::kUnknownPartition);
+  if (!known && !limit_.over(now)) {
+    state_ = State::kDiscover;
+  } else if (asks_ && !fresh_ && !limit_.over(now)) {
+    state_ = State::kKnow;
+  } else {
+    finish(std::move(planned), !may_exist ? Certainty::kFinal
+                               : known    ? Certainty::kKnown
+                                          : Certainty::kUndecided);
+  }
+}
+
+void Call::ask() {
+  requests_.emplace(table_, task_.parts(), limit_);
+  state_ = State::kAsk;
+}
+
+void Call::replied(Clock::time_point now) {
+  std::vector<Reply> replies = requests_->take_replies();
+  requests_.reset();
+  if (task_.changes()) note_changes(replies);
+  taken_ = task_.take(std::move(replies), now);
+  if (!changes_.empty()) {
+    state_ = State::kConfirm;
+    until_ = limit_.at();
+  } else {
+    stored_or_none(now);
+  }
+}
+
+void Call::note_changes(const std::vector<Reply>& replies) {
+  const std::vector<Part>& parts = task_.parts();
+  own_.reset();
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const Reply& reply = replies[i];
+    if (std::holds_alternative<Error>(reply.body)) continue;
+    if (parts[i].owner != kHeldHere) {
+      changes_.push_back({parts[i].owner, parts[i].partition, reply.epoch, reply.lamport_time});
+    } else if (is_of_structure(parts[i].request)) {
+      own_ = i;
+    }
+  }
+}
+
+bool Call::confirm(Directory& directory, Clock::time_point now) {
+  bool all_here = true;
+  late_.clear();
+  outdates_ = false;
+  const auto is_here = [&](const Change& change) {
+    return directory.epoch(change.owner) >= change.epoch || !directory.reachable(change.owner);
+  };
+  for (const Change& change : changes_) {
+    directory.saw_lamport_time(change.lamport_time);
+    all_here = all_here && is_here(change);
+  }
+  if (keeps_all_ && !all_here && !limit_.over(now)) return false;
+  for (const Change& change : changes_) {
+    if (keeps_all_ && !is_here(change)) late_.push_back(change.partition);
+    if (directory.note_announced_epoch(change.owner, change.epoch)) outdates_ = true;
+  }
+  changes_.clear();
+  stored_or_none(now);
+  return true;
+}
+
+void Call::stored_or_none(Clock::time_point now) {
+  if (!own_) return judge(now);
+  state_ = State::kStore;
+  until_ = limit_.at();
+}
+
+const Request& Call::stored_change() const { return task_.parts()[*own_].request; }
+
+void Call::stored(Result<void> stored, Clock::time_point now) {
+  own_.reset();
+  if (!stored && taken_) taken_ = tl::unexpected(std::move(stored.error()));
+  judge(now);
+}
+
+void Call::judge(Clock::time_point now) {
+  if (!taken_) return retry(std::move(taken_.error()), now);
+  switch (*taken_) {
+    case Task::Next::kDone:
+      return finish({});
+    case Task::Next::kAsk:
+      return ask();
+    case Task::Next::kPlan:
+      attempts_ = 0;
+      pause_ = kFirstPause;
+      max_age_ = task_.max_age();
+      return pause(now + task_.pause(), {});
+  }
+}
+
+void Call::retry(Error error, Clock::time_point now) {
+  if (!task_.may_plan_again()) return fail(std::move(error));
+  const bool denies = denies_plan(error.code);
+  const bool in_time = !limit_.over(now + pause_);
+  if (asks_) {
+    const bool outdated = error.code == Errc::kNotOwner && pause_ <= kStructureDelay;
+    if (!(outdated || denies) || !in_time) return fail(std::move(error));
+    if (!fresh_) {
+      state_ = State::kKnow;
+      return;
+    }
+  } else if (error.code == Errc::kNotOwner && ++attempts_ < kAttempts && !limit_.over(now)) {
+    return pause(std::min(now + kStructureDelay, limit_.at()), version_);
+  } else if (!denies || !in_time) {
+    return fail(std::move(error));
+  }
+  pause(now + pause_, {});
+  pause_ *= 2;
+}
+
+void Call::pause(Clock::time_point until, std::optional<std::uint64_t> awaits) {
+  until_ = until;
+  awaits_ = awaits;
+  state_ = State::kPause;
+}
+
+void Call::finish(Result<void> outcome, Certainty certainty) {
+  outcome_ = std::move(outcome);
+  certainty_ = certainty;
+  requests_.reset();
+  state_ = State::kOver;
+}
+
+}  // namespace tfdude

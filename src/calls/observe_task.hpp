@@ -1,0 +1,75 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calls/call.hpp"
+#include "partition/observing.hpp"
+
+namespace tfdude {
+
+/// A measurement of a path.
+struct Measurement {
+  std::string a;
+  std::string b;
+  Transform X_AB;
+  std::optional<Time> stamp;
+  ObserveOptions options;
+};
+
+/// Applies a measurement: asks for all edges of the path at one instant, computes their
+/// corrections, and sends each owner its share. If nothing was applied because an edge has changed
+/// meanwhile, it does all of this again.
+class ObserveTask final : public Task {
+ public:
+  /// @param source  a name of the measurement's error that no other has
+  /// @param asks_for_frames  the participant does not keep all frames
+  ObserveTask(const Forest& forest, Measurement measurement, std::string source,
+              bool asks_for_frames, const TimeLimit& limit);
+
+  [[nodiscard]] std::vector<std::string> frames() const override;
+  [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point now) override;
+  [[nodiscard]] std::vector<Part>& parts() override {
+    return stage_ < Stage::kFirst ? plan_.parts : shares_;
+  }
+  [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point now) override;
+  [[nodiscard]] bool may_plan_again() const override { return stage_ < Stage::kFirst; }
+  [[nodiscard]] Milliseconds pause() const override { return pause_; }
+
+  /// Once it is done.
+  [[nodiscard]] Observed& observed() { return observed_; }
+
+ private:
+  enum class Stage {
+    kNewest,   ///< asks for the newest values, or those at the stamp
+    kInstant,  ///< asks for the values at the latest common time
+    kFirst,    ///< the first owner is asked to apply its share
+    kOthers,   ///< and then all others
+  };
+
+  [[nodiscard]] Result<Next> values(std::vector<Reply> replies, Clock::time_point now);
+  [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
+  [[nodiscard]] Result<Next> apply(const ObservedPath& path, const Observation& found);
+  [[nodiscard]] Result<Next> first(Reply reply);
+  [[nodiscard]] Result<Next> others(const std::vector<Reply>& replies) const;
+  [[nodiscard]] Result<Next> again();
+
+  const Forest& forest_;
+  const Measurement measurement_;
+  const std::string source_;
+  const bool asks_for_frames_;
+  const TimeLimit limit_;
+  Stage stage_ = Stage::kNewest;
+  ObservePlan plan_;
+  std::vector<std::string> beside_;   // edges that were observed with some of the path
+  std::vector<std::string> unknown_;  // further ones, of which others have been asked
+  std::vector<Part> shares_;
+  std::vector<Part> later_;  // shares of all owners but the first
+  Observed observed_;
+  int attempts_ = 0;
+  int torn_ = 0;
+  Milliseconds pause_{0};
+};
+
+}  // namespace tfdude
