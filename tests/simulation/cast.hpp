@@ -25,6 +25,8 @@ struct Configured {
   void change(std::size_t how);
 };
 
+class Measurer;
+class Pacer;
 class Streamer;
 class Waiter;
 
@@ -54,6 +56,8 @@ struct Cast {
   std::vector<std::shared_ptr<Follower>> followers;
   std::vector<std::shared_ptr<Sampler>> samplers;
   std::vector<std::shared_ptr<Waiter>> waiters;
+  std::vector<std::shared_ptr<Measurer>> measurers;
+  std::vector<std::shared_ptr<Pacer>> pacers;
   std::vector<std::shared_ptr<Streamer>> streamers;
 
   [[nodiscard]] std::string name_of_daemon(std::size_t owner) const;

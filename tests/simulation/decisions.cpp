@@ -63,6 +63,8 @@ std::vector<Decision> decisions_of(const Plan& plan) {
   all.push_back({with("followers", plan.followers), [](Plan& one) { one.followers = 0; }});
   all.push_back({with("samplers", plan.samplers), [](Plan& one) { one.samplers = 0; }});
   all.push_back({with("waiters", plan.waiters), [](Plan& one) { one.waiters = 0; }});
+  all.push_back({with("measurers", plan.measurers), [](Plan& one) { one.measurers = 0; }});
+  all.push_back({with("pacers", plan.pacers), [](Plan& one) { one.pacers = 0; }});
   all.push_back({with("streamers", plan.streamers), [](Plan& one) { one.streamers = 0; }});
   all.push_back(
       {with("forgets who is lost:", plan.forgets), [](Plan& one) { one.forgets = false; }});

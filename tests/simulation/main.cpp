@@ -69,6 +69,8 @@ constexpr const char* kRare[] = {"a process gave its partition up",
                                  "waiting lookup done after a while",
                                  "waiting lookup timeout",
                                  "streams checked",
+                                 "a measured path was looked up",
+                                 "an earlier instant was predicted",
                                  "fault deputize",
                                  "a deputy's removal was checked"};
 

@@ -267,6 +267,8 @@ Plan draw_plan(std::uint64_t seed) {
   plan.streamers = random.index(2);
   draw_beside(random, plan);
   draw_deputy(random, plan);
+  plan.measurers = random.index(4) == 0 ? 1 : 0;
+  plan.pacers = random.index(4) == 0 ? 1 : 0;
   return plan;
 }
 

@@ -62,6 +62,8 @@ struct Plan {
   std::size_t followers = 0;  ///< clients that read watched paths
   std::size_t samplers = 0;   ///< clients that write stamped samples
   std::size_t waiters = 0;    ///< clients whose lookups wait
+  std::size_t measurers = 0;  ///< clients that observe paths
+  std::size_t pacers = 0;     ///< clients that look for the latest common time
   std::size_t streamers = 0;  ///< clients that stream what comes and goes
   Instant storm{};            ///< duration of the phase with faults
   double loss = 0;            ///< of datagrams, and of samples that are repeated then
@@ -98,7 +100,9 @@ struct Plan {
   }
 
   /// How many make operations that are counted.
-  [[nodiscard]] std::size_t actors() const { return clients + followers + samplers + waiters; }
+  [[nodiscard]] std::size_t actors() const {
+    return clients + followers + samplers + waiters + measurers + pacers;
+  }
   /// For the random numbers of one operation.
   [[nodiscard]] std::uint64_t seed_of(std::size_t actor, std::size_t operation) const;
   [[nodiscard]] bool leaves_out(std::size_t actor, std::size_t operation) const;

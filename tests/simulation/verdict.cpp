@@ -4,6 +4,8 @@
 #include <map>
 #include <set>
 
+#include "simulation/measurer.hpp"
+#include "simulation/pacer.hpp"
 #include "simulation/streamer.hpp"
 #include "simulation/waiter.hpp"
 
@@ -71,9 +73,6 @@ void Verdict::check() {
   }
   for (const auto& follower : cast_.followers) check_follower(*follower);
   check_samplers();
-  for (const auto& waiter : cast_.waiters) {
-    if (hears_all(waiter->process())) waiter->check();
-  }
   for (const auto& streamer : cast_.streamers) {
     if (hears_all(streamer->process())) streamer->check(cast_);
   }
@@ -84,6 +83,8 @@ void Verdict::check() {
   for (const auto& follower : cast_.followers) add(follower);
   for (const auto& sampler : cast_.samplers) add(sampler);
   for (const auto& waiter : cast_.waiters) add(waiter);
+  for (const auto& measurer : cast_.measurers) add(measurer);
+  for (const auto& pacer : cast_.pacers) add(pacer);
   for (const auto& streamer : cast_.streamers) add(streamer);
   for (Process* one : all) check_kept(*one);
 }
@@ -108,8 +109,7 @@ void Verdict::check_kept_by_owner(Process& owner) {
   };
   const Partition* partition = owner.member().partition();
   if (partition == nullptr) return;
-  const std::size_t clients =
-      cast_.authors.size() + cast_.followers.size() + cast_.samplers.size() + cast_.waiters.size();
+  const std::size_t clients = plan_.actors();
   if (partition->kept_replies() > kRepliesPerClient * clients) {
     grows(" keeps " + std::to_string(partition->kept_replies()) + " replies");
   }

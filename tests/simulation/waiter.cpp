@@ -15,8 +15,8 @@ using faults::base_of;
 
 // How much later than its time a lookup may end.
 constexpr Instant kEndsWithin = milliseconds(20);
-// No request in progress is repeated less often.
-constexpr milliseconds kRarestRepeat{160};
+// How long after the faults each frame that is known can be looked up.
+constexpr Instant kCalmAfter = milliseconds(5000);
 
 }  // namespace
 
@@ -107,7 +107,28 @@ void Waiter::all_replied() {
   });
 }
 
+// What is sent for the first time has just been planned.
+Result<void> Waiter::send(const std::string& partition, const Request& request,
+                          TimeLimit::Clock::time_point until) {
+  const auto& segments = std::get<LookupRequest>(request.body).segments;
+  const auto planned = route();
+  const auto asks = [&](const Part& part) {
+    const auto& all = std::get<LookupRequest>(part.request.body).segments;
+    return part.partition == partition &&
+           std::equal(all.begin(), all.end(), segments.begin(), segments.end(),
+                      [](const PathEnds& a, const PathEnds& b) {
+                        return a.from == b.from && a.to == b.to;
+                      });
+  };
+  const bool current = planned && std::any_of(planned->parts.begin(), planned->parts.end(), asks);
+  if (sent_.insert(request.sequence).second && !current) {
+    process_->world().violation("a route is kept too long", frame_ + ": asks " + partition);
+  }
+  return process_->send(partition, request, until);
+}
+
 void Waiter::wait(Error last) {
+  sent_.clear();
   lookup_ = std::make_shared<WaitingLookup>(wanted(), *limit_, std::move(last), now());
   begin();
   Surroundings& world = process_->world();
@@ -121,7 +142,7 @@ void Waiter::wait(Error last) {
 void Waiter::attend(bool written) {
   WaitingLookup::Shared shared{process_->forest(),
                                process_->replies(),
-                               *process_,
+                               static_cast<RequestLink&>(*this),
                                process_->hints(),
                                static_cast<LookupHost&>(*this),
                                static_cast<ReplyListener*>(this),
@@ -144,17 +165,14 @@ void Waiter::end(const Result<StampedTransform>& X_WB) {
   const bool right = !X_WB || frame_ != base_of(base_) ||
                      (X_WB->pose.translation() - base_edge(base_).pose.translation()).norm() < 1e-9;
   if (!right) world.violation("a wrong answer", "a lookup that waited, of " + frame_);
+  const bool calm =
+      world.plan.lasting.empty() && world.timeline.now() > world.plan.storm + kCalmAfter;
+  if (!X_WB && calm && route()) world.violation("a lookup waits for nothing", frame_);
   const std::string how = !X_WB ? "timeout" : had_to_ ? "done after a while" : "done";
   begin();
   ++outcomes_["waiting lookup " + how];
   world.trace("a waiting lookup of " + frame_ + ": " + how);
   next();
-}
-
-void Waiter::check() {
-  if (lookup_ == nullptr || limit_->over(now() + 2 * kRarestRepeat)) return;
-  const bool sleeps = lookup_->next() == limit_->at();
-  if (sleeps && route()) process_->world().violation("a lookup waits for nothing", frame_);
 }
 
 }  // namespace tfdude::simulation

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "calls/waiting_lookup.hpp"
@@ -19,6 +20,7 @@ namespace tfdude::simulation {
 class Waiter final : public Planned,
                      private LookupHost,
                      private ReplyListener,
+                     private RequestLink,
                      public std::enable_shared_from_this<Waiter> {
  public:
   /// @param actor  the number by which its operations are counted
@@ -27,8 +29,6 @@ class Waiter final : public Planned,
   /// Goes on until stop(); a lookup that waits then goes on waiting.
   void start();
   void stop() { stopped_ = true; }
-  /// There must be no lookup that waits although it has an answer.
-  void check();
 
   [[nodiscard]] Process& process() { return *process_; }
   [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
@@ -53,6 +53,11 @@ class Waiter final : public Planned,
 
   void all_replied() override;
 
+  // RequestLink
+  [[nodiscard]] Result<void> send(const std::string& partition, const Request& request,
+                                  TimeLimit::Clock::time_point until) override;
+  [[nodiscard]] Reply answer(const Request& request) override { return process_->answer(request); }
+
   [[nodiscard]] std::string plan() const override;
   [[nodiscard]] bool hears(const Told& told) const override {
     return lookup_ != nullptr && (told.structure || told.routes);
@@ -70,6 +75,7 @@ class Waiter final : public Planned,
   std::shared_ptr<WaitingLookup> lookup_;  // once it waits
   TimeLimit::Clock::time_point wakes_{};   // by the newest of its timers
   std::uint64_t told_ = 0;                 // how often something has changed
+  std::set<std::uint32_t> sent_;           // the numbers of its requests
   std::size_t steps_ = 0;
   std::map<std::string, std::size_t> outcomes_;
   bool stopped_ = false;

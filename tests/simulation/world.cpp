@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "simulation/daemons.hpp"
+#include "simulation/measurer.hpp"
+#include "simulation/pacer.hpp"
 #include "simulation/streamer.hpp"
 #include "simulation/verdict.hpp"
 #include "simulation/waiter.hpp"
@@ -59,11 +61,13 @@ class World {
 
   Run run() {
     daemons_.start();
-    for (std::size_t i = 0; i < plan_.clients; ++i) start_author(i);
-    for (std::size_t i = 0; i < plan_.followers; ++i) start_follower(i);
-    for (std::size_t i = 0; i < plan_.samplers; ++i) start_sampler(i);
+    for (std::size_t i = 0; i < plan_.clients; ++i) start(cast_.authors, i);
+    for (std::size_t i = 0; i < plan_.followers; ++i) start(cast_.followers, i);
+    for (std::size_t i = 0; i < plan_.samplers; ++i) start(cast_.samplers, i);
     for (std::size_t i = 0; i < plan_.waiters; ++i) start_waiter();
     for (std::size_t i = 0; i < plan_.streamers; ++i) start_streamer();
+    for (std::size_t i = 0; i < plan_.measurers; ++i) start(cast_.measurers, i);
+    for (std::size_t i = 0; i < plan_.pacers; ++i) start(cast_.pacers, i);
     for (const auto* faults : {&plan_.faults, &plan_.beside}) {
       for (const Fault& fault : *faults) {
         timeline_.at(fault.begin, {"fault"}, [this, &fault] { daemons_.begin(fault); });
@@ -75,6 +79,8 @@ class World {
     for (const auto& follower : cast_.followers) follower->stop();
     for (const auto& sampler : cast_.samplers) sampler->stop();
     for (const auto& waiter : cast_.waiters) waiter->stop();
+    for (const auto& measurer : cast_.measurers) measurer->stop();
+    for (const auto& pacer : cast_.pacers) pacer->stop();
     network_.set_loss(plan_.loss_after);
     for (const Fault& fault : plan_.lasting) daemons_.begin(fault);
     if (plan_.forgets) {
@@ -95,6 +101,8 @@ class World {
     for (const auto& follower : cast_.followers) add_outcomes(*follower);
     for (const auto& sampler : cast_.samplers) add_outcomes(*sampler);
     for (const auto& waiter : cast_.waiters) add_outcomes(*waiter);
+    for (const auto& measurer : cast_.measurers) add_outcomes(*measurer);
+    for (const auto& pacer : cast_.pacers) add_outcomes(*pacer);
     run_.duration = timeline_.now();
     return std::move(run_);
   }
@@ -144,6 +152,8 @@ class World {
     for (const auto& author : cast_.authors) named += author->added();
     for (const auto& follower : cast_.followers) named += follower->added();
     for (const auto& sampler : cast_.samplers) named += sampler->added();
+    for (const auto& measurer : cast_.measurers) named += measurer->added();
+    for (const auto& pacer : cast_.pacers) named += pacer->added();
     return named;
   }
 
@@ -171,22 +181,10 @@ class World {
     return process;
   }
 
-  void start_author(std::size_t number) {
-    cast_.authors.push_back(
-        std::make_shared<Author>(start_client(), number, actors_++, cast_.wild));
-    cast_.authors.back()->start();
-  }
-
-  void start_follower(std::size_t number) {
-    cast_.followers.push_back(
-        std::make_shared<Follower>(start_client(), number, actors_++, cast_.wild));
-    cast_.followers.back()->start();
-  }
-
-  void start_sampler(std::size_t number) {
-    cast_.samplers.push_back(
-        std::make_shared<Sampler>(start_client(), number, actors_++, cast_.wild));
-    cast_.samplers.back()->start();
+  template <class Actor>
+  void start(std::vector<std::shared_ptr<Actor>>& actors, std::size_t number) {
+    actors.push_back(std::make_shared<Actor>(start_client(), number, actors_++, cast_.wild));
+    actors.back()->start();
   }
 
   void start_waiter() {
