@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -15,334 +16,307 @@
 namespace tfdude::ros {
 namespace {
 
-using Keys = std::string_view;
-
-class Reader : public YamlFields {
- public:
-  using YamlFields::YamlFields;
-
-  [[nodiscard]] Result<void> read(const YAML::Node& root, Settings& settings) const;
-
- private:
-  using Section = Result<void> (Reader::*)(const YAML::Node& node, Settings& settings) const;
-
-  [[nodiscard]] Result<void> tf_in(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> tf_out(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> joints_in(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> joints_out(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> description_in(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> description_out(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> poses_in(const YAML::Node& node, Settings& settings) const;
-  [[nodiscard]] Result<void> poses_out(const YAML::Node& node, Settings& settings) const;
-
-  [[nodiscard]] Result<void> words(const Fields& fields, std::string_view key,
-                                   const std::string& place, std::string& out) const;
-  [[nodiscard]] Result<void> list(const Fields& fields, std::string_view key,
-                                  const std::string& place, std::vector<std::string>& out) const;
-  [[nodiscard]] Result<void> patterns(const Fields& fields, std::string_view key,
-                                      const std::string& place, Patterns& out) const;
-  [[nodiscard]] Result<void> covariance(const YAML::Node& node, const Fields& fields,
-                                        const std::string& place, StatedCovariance& out) const;
-  /// A number within a range, which the error names. Without the key, `out` stays as it is.
-  /// @tparam Number  double or std::optional<double>
-  template <class Number>
-  [[nodiscard]] Result<void> within(const Fields& fields, std::string_view key,
-                                    const std::string& place, double least, double most,
-                                    Number& out) const;
-  [[nodiscard]] Result<void> is_odometry(const YAML::Node& node, const std::string& place,
-                                         const std::string& type, bool& out) const;
-  /// An entry that must be there.
-  [[nodiscard]] Result<void> require(const YAML::Node& node, const Fields& fields,
-                                     std::string_view key, const std::string& place) const;
-};
+using Key = std::string_view;
 
 constexpr double kMaxRate = 1e6;
 constexpr double kMaxStddev = 1e9;
 
-Result<void> Reader::words(const Fields& fields, std::string_view key, const std::string& place,
-                           std::string& out) const {
-  const auto found = fields.find(key);
-  if (found == fields.end()) return {};
-  auto value = text(found->second, place + ": " + found->first);
-  if (!value) return tl::unexpected(std::move(value.error()));
-  out = *std::move(value);
-  return {};
-}
-
-Result<void> Reader::list(const Fields& fields, std::string_view key, const std::string& place,
-                          std::vector<std::string>& out) const {
-  const auto found = fields.find(key);
-  if (found == fields.end()) return {};
-  const std::string what = place + ": " + found->first;
-  if (!found->second.value.IsSequence()) {
-    return error(Errc::kConfig, found->second.mark, what + " is not a list");
+// A mapping, whose entries are read one after the other, until one is wrong. An entry that is left
+// out leaves its value as it is.
+class Mapping : private YamlFields {
+ public:
+  template <std::size_t N>
+  Mapping(const std::string& file, const YAML::Node& node, const std::array<Key, N>& keys,
+          std::string place)
+      : YamlFields(file), node_(node), place_(std::move(place)) {
+    store(fields(node, keys, place_), entries_);
   }
-  out.clear();
-  for (const YAML::Node& one : found->second.value) {
-    auto value = text({one, one.Mark()}, what);
-    if (!value) return tl::unexpected(std::move(value.error()));
-    out.push_back(*std::move(value));
+
+  // An entry that must be there.
+  Mapping& require(Key key) {
+    return check(has(key), Errc::kConfig, ": " + std::string(key) + " is missing");
   }
-  return {};
-}
-
-Result<void> Reader::patterns(const Fields& fields, std::string_view key, const std::string& place,
-                              Patterns& out) const {
-  std::vector<std::string> texts;
-  if (auto ok = list(fields, key, place, texts); !ok) return ok;
-  out = Patterns(std::move(texts));
-  return {};
-}
-
-Result<void> Reader::covariance(const YAML::Node& node, const Fields& fields,
-                                const std::string& place, StatedCovariance& out) const {
-  const auto X = transform(node, fields, place, out);
-  if (!X) return tl::unexpected(X.error());
-  out = X->covariance;
-  return {};
-}
-
-template <class Number>
-Result<void> Reader::within(const Fields& fields, std::string_view key, const std::string& place,
-                            double least, double most, Number& out) const {
-  std::optional<double> value;
-  if (auto ok = number(fields, key, place, value); !ok) return ok;
-  if (!value) return {};
-  if (*value >= least && *value <= most) {
+  Mapping& words(Key key, std::string& out) {
+    if (ok_ && has(key)) store(text(field(key), what(key)), out);
+    return *this;
+  }
+  Mapping& flag(Key key, bool& out) {
+    if (ok_) ok_ = YamlFields::flag(entries_, key, place_, out);
+    return *this;
+  }
+  Mapping& list(Key key, std::vector<std::string>& out) {
+    if (!ok_ || !has(key)) return *this;
+    const YAML::Node& all = field(key).value;
+    if (!all.IsSequence()) return fail(Errc::kConfig, what(key) + " is not a list", key);
+    out.resize(all.size());
+    for (std::size_t i = 0; i < all.size() && ok_; ++i) {
+      store(text({all[i], all[i].Mark()}, what(key)), out[i]);
+    }
+    return *this;
+  }
+  Mapping& patterns(Key key, Patterns& out) {
+    std::vector<std::string> texts;
+    list(key, texts);
+    out = Patterns(std::move(texts));
+    return *this;
+  }
+  // A number within a range, which the error names.
+  // @tparam Number  double or std::optional<double>
+  template <class Number>
+  Mapping& within(Key key, double least, double most, Number& out) {
+    std::optional<double> value;
+    if (ok_) ok_ = number(entries_, key, place_, value);
+    if (!value) return *this;
     out = *value;
-    return {};
+    if (*value >= least && *value <= most) return *this;
+    return fail(Errc::kInvalidInput,
+                what(key) + " is not within " + number_text(least) + " and " + number_text(most),
+                key);
   }
-  return error(Errc::kInvalidInput, fields.find(key)->second.mark,
-               place + ": " + std::string(key) + " is not within " + number_text(least) + " and " +
-                   number_text(most));
-}
+  // A mapping of such numbers.
+  Mapping& within(Key key, double least, double most, std::map<std::string, double>& out) {
+    if (!ok_ || !has(key)) return *this;
+    Mapping all(name(), field(key).value, std::array<Key, 0>{}, what(key));
+    for (const auto& [one, value] : all.entries_) all.within(one, least, most, out[one]);
+    ok_ = all.ok_;
+    return *this;
+  }
+  Mapping& transform(Transform& out) {
+    if (ok_) store(YamlFields::transform(node_, entries_, place_, out.covariance), out);
+    return *this;
+  }
+  // "pose" or "odometry"
+  Mapping& type(bool& odometry) {
+    std::string type = "pose";
+    words("type", type);
+    odometry = type == "odometry";
+    return check(odometry || type == "pose", Errc::kInvalidInput,
+                 ": type is neither pose nor odometry");
+  }
+  // A rule for all entries together. @param broken  follows the place in the error
+  Mapping& check(bool good, Errc code, const std::string& broken) {
+    return good ? *this : fail(code, place_ + broken);
+  }
+  Mapping& check(const Result<void>& rule) {
+    return rule ? *this : check(false, rule.error().code, ": " + rule.error().message);
+  }
 
-Result<void> Reader::require(const YAML::Node& node, const Fields& fields, std::string_view key,
-                             const std::string& place) const {
-  if (fields.find(key) != fields.end()) return {};
-  return error(Errc::kConfig, node.Mark(), place + ": " + std::string(key) + " is missing");
-}
+  [[nodiscard]] const Result<void>& result() const { return ok_; }
+  // The value of an entry; null if it is left out.
+  [[nodiscard]] const YAML::Node* value(Key key) const {
+    return has(key) ? &field(key).value : nullptr;
+  }
+  // @param at  absent: at the mapping
+  Mapping& fail(Errc code, const std::string& message, std::optional<Key> at = {}) {
+    if (ok_) ok_ = error(code, at ? field(*at).mark : node_.Mark(), message);
+    return *this;
+  }
 
-Result<void> Reader::tf_in(const YAML::Node& node, Settings& settings) const {
+ private:
+  template <class Value>
+  void store(Result<Value> value, Value& out) {
+    if (value) {
+      out = *std::move(value);
+    } else {
+      ok_ = tl::unexpected(std::move(value.error()));
+    }
+  }
+  [[nodiscard]] bool has(Key key) const { return entries_.find(key) != entries_.end(); }
+  [[nodiscard]] const Field& field(Key key) const { return entries_.find(key)->second; }
+  [[nodiscard]] std::string what(Key key) const { return place_ + ": " + std::string(key); }
+
+  const YAML::Node node_;
+  const std::string place_;
+  Fields entries_;
+  Result<void> ok_;
+};
+
+struct Scalars : YamlFields {
+  using YamlFields::text;
+  using YamlFields::YamlFields;
+};
+
+// A section of a file.
+struct Section {
+  YAML::Node node;
+  const std::string& file;
+};
+
+Result<void> tf_in(const Section& section, Settings& settings) {
   // "tf_in: false" instead of a mapping.
-  if (node.IsScalar() && node.Scalar() == "false") {
+  if (section.node.IsScalar() && section.node.Scalar() == "false") {
     settings.frames_in.reset();
     return {};
   }
-  constexpr std::array<Keys, 5> kKeys = {"frames", "except", "stddev", "cov", "covariance"};
-  const auto entries = fields(node, kKeys, "tf_in");
-  if (!entries) return tl::unexpected(entries.error());
-  ImportSettings in;
-  auto ok = patterns(*entries, "frames", "tf_in", in.frames.include)
-                .and_then([&] { return patterns(*entries, "except", "tf_in", in.frames.exclude); })
-                .and_then([&] { return covariance(node, *entries, "tf_in", in.covariance); });
-  settings.frames_in = std::move(in);
+  constexpr std::array<Key, 5> kKeys = {"frames", "except", "stddev", "cov", "covariance"};
+  ImportSettings& in = settings.frames_in.emplace();
+  Transform X{Pose(), in.covariance};
+  const auto ok = Mapping(section.file, section.node, kKeys, "tf_in")
+                      .patterns("frames", in.frames.include)
+                      .patterns("except", in.frames.exclude)
+                      .transform(X)
+                      .result();
+  in.covariance = X.covariance;
   return ok;
 }
 
-Result<void> Reader::tf_out(const YAML::Node& node, Settings& settings) const {
-  constexpr std::array<Keys, 3> kKeys = {"partitions", "frames", "rate"};
-  const auto entries = fields(node, kKeys, "tf_out");
-  if (!entries) return tl::unexpected(entries.error());
-  ExportSettings out;
-  auto ok =
-      patterns(*entries, "partitions", "tf_out", out.partitions)
-          .and_then([&] { return patterns(*entries, "frames", "tf_out", out.frames); })
-          .and_then([&] { return within(*entries, "rate", "tf_out", 0, kMaxRate, out.rate); });
-  settings.frames_out = std::move(out);
-  return ok;
+Result<void> tf_out(const Section& section, Settings& settings) {
+  ExportSettings& out = settings.frames_out.emplace();
+  constexpr std::array<Key, 3> kKeys = {"partitions", "frames", "rate"};
+  return Mapping(section.file, section.node, kKeys, "tf_out")
+      .patterns("partitions", out.partitions)
+      .patterns("frames", out.frames)
+      .within("rate", 0, kMaxRate, out.rate)
+      .result();
 }
 
-Result<void> Reader::joints_in(const YAML::Node& node, Settings& settings) const {
-  constexpr std::array<Keys, 5> kKeys = {"stddev", "stddev_of", "joints", "except", "partition"};
-  const auto entries = fields(node, kKeys, "joints_in");
-  if (!entries) return tl::unexpected(entries.error());
-  JointImportSettings in;
-  auto ok =
-      within(*entries, "stddev", "joints_in", 0, kMaxStddev, in.stddev)
-          .and_then([&] { return patterns(*entries, "joints", "joints_in", in.joints.include); })
-          .and_then([&] { return patterns(*entries, "except", "joints_in", in.joints.exclude); })
-          .and_then([&] { return words(*entries, "partition", "joints_in", in.partition); });
-  if (!ok) return ok;
-  if (const auto name = check_partition_name(in.partition); !in.partition.empty() && !name) {
-    return error(name.error().code, node.Mark(), "joints_in: " + name.error().message);
-  }
-  if (const auto found = entries->find("stddev_of"); found != entries->end()) {
-    const std::string what = "joints_in: stddev_of";
-    const auto joints = fields(found->second.value, what);
-    if (!joints) return tl::unexpected(joints.error());
-    for (const auto& [name, field] : *joints) {
-      if (ok = within(*joints, name, what, 0, kMaxStddev, in.stddev_of[name]); !ok) return ok;
-    }
-  }
-  settings.joints_in = std::move(in);
-  return {};
+Result<void> joints_in(const Section& section, Settings& settings) {
+  JointImportSettings& in = settings.joints_in.emplace();
+  constexpr std::array<Key, 5> kKeys = {"stddev", "stddev_of", "joints", "except", "partition"};
+  Mapping entries(section.file, section.node, kKeys, "joints_in");
+  entries.within("stddev", 0, kMaxStddev, in.stddev)
+      .patterns("joints", in.joints.include)
+      .patterns("except", in.joints.exclude)
+      .words("partition", in.partition);
+  if (!in.partition.empty()) entries.check(check_partition_name(in.partition));
+  return entries.within("stddev_of", 0, kMaxStddev, in.stddev_of).result();
 }
 
-Result<void> Reader::joints_out(const YAML::Node& node, Settings& settings) const {
-  constexpr std::array<Keys, 2> kKeys = {"partitions", "rate"};
-  const auto entries = fields(node, kKeys, "joints_out");
-  if (!entries) return tl::unexpected(entries.error());
-  JointExportSettings out;
-  auto ok =
-      require(node, *entries, "partitions", "joints_out")
-          .and_then([&] { return patterns(*entries, "partitions", "joints_out", out.partitions); })
-          .and_then(
-              [&] { return within(*entries, "rate", "joints_out", 0.001, kMaxRate, out.rate); });
-  settings.joints_out = std::move(out);
-  return ok;
+Result<void> joints_out(const Section& section, Settings& settings) {
+  JointExportSettings& out = settings.joints_out.emplace();
+  return Mapping(section.file, section.node, std::array<Key, 2>{"partitions", "rate"}, "joints_out")
+      .require("partitions")
+      .patterns("partitions", out.partitions)
+      .within("rate", 0.001, kMaxRate, out.rate)
+      .result();
 }
 
-Result<void> Reader::description_in(const YAML::Node& node, Settings& settings) const {
-  constexpr std::array<Keys, 11> kKeys = {"partition", "root",       "xyz",           "rpy",
-                                          "quat",      "links",      "strict_limits", "stddev",
-                                          "cov",       "covariance", "fixed"};
-  const auto entries = fields(node, kKeys, "description_in");
-  if (!entries) return tl::unexpected(entries.error());
-  DescriptionSettings in;
+Result<void> description_in(const Section& section, Settings& settings) {
+  constexpr std::array<Key, 11> kKeys = {"partition", "root",       "xyz",           "rpy",
+                                         "quat",      "links",      "strict_limits", "stddev",
+                                         "cov",       "covariance", "fixed"};
+  DescriptionSettings& in = settings.description_in.emplace();
   std::string fixed;
-  auto ok = words(*entries, "partition", "description_in", in.partition)
-                .and_then([&] { return words(*entries, "root", "description_in", in.part.root); })
-                .and_then([&] { return list(*entries, "links", "description_in", in.part.links); })
-                .and_then([&] {
-                  return flag(*entries, "strict_limits", "description_in", in.part.strict_limits);
-                })
-                .and_then([&] { return words(*entries, "fixed", "description_in", fixed); });
-  if (!ok) return ok;
-  const auto X_root = transform(node, *entries, "description_in", {});
-  if (!X_root) return tl::unexpected(X_root.error());
-  in.part.X_root = *X_root;
-  if (const auto name = check_new_partition_name(in.partition); !name) {
-    return error(name.error().code, node.Mark(), "description_in: " + name.error().message);
-  }
-  if (!fixed.empty()) {
+  in.part.X_root = Transform{Pose(), {}};
+  Mapping entries(section.file, section.node, kKeys, "description_in");
+  entries.words("partition", in.partition)
+      .words("root", in.part.root)
+      .list("links", in.part.links)
+      .flag("strict_limits", in.part.strict_limits)
+      .words("fixed", fixed)
+      .transform(in.part.X_root);
+  entries.check(check_new_partition_name(in.partition));
+  if (entries.result() && !fixed.empty()) {
     const auto stated = covariance_named(fixed);
-    if (!stated) return error(stated.error().code, node.Mark(), stated.error().message);
+    if (!stated) return entries.fail(stated.error().code, stated.error().message).result();
     in.part.fixed = *stated;
   }
-  settings.description_in = std::move(in);
-  return {};
+  return entries.result();
 }
 
-Result<void> Reader::description_out(const YAML::Node& node, Settings& settings) const {
-  DescriptionOutSettings out;
-  if (!node.IsMap()) {
-    auto file = text({node, node.Mark()}, "description_out");
-    if (!file) return tl::unexpected(std::move(file.error()));
-    out.file = (std::filesystem::path(name()).parent_path() / *file).string();
-  } else {
-    const auto entries = fields(node, std::array<Keys, 1>{"partition"}, "description_out");
-    if (!entries) return tl::unexpected(entries.error());
-    auto ok = require(node, *entries, "partition", "description_out").and_then([&] {
-      return words(*entries, "partition", "description_out", out.partition);
-    });
-    if (!ok) return ok;
-    if (const auto name = check_partition_name(out.partition); !name) {
-      return error(name.error().code, node.Mark(), "description_out: " + name.error().message);
-    }
+Result<void> description_out(const Section& section, Settings& settings) {
+  DescriptionOutSettings& out = settings.description_out.emplace();
+  if (section.node.IsMap()) {
+    constexpr std::array<Key, 1> kKeys = {"partition"};
+    Mapping entries(section.file, section.node, kKeys, "description_out");
+    entries.require("partition").words("partition", out.partition);
+    return entries.check(check_partition_name(out.partition)).result();
   }
-  settings.description_out = std::move(out);
+  const auto file =
+      Scalars(section.file).text({section.node, section.node.Mark()}, "description_out");
+  if (!file) return tl::unexpected(file.error());
+  out.file = (std::filesystem::path(section.file).parent_path() / *file).string();
   return {};
 }
 
-Result<void> Reader::is_odometry(const YAML::Node& node, const std::string& place,
-                                 const std::string& type, bool& out) const {
-  out = type == "odometry";
-  if (out || type == "pose") return {};
-  return error(Errc::kInvalidInput, node.Mark(), place + ": type is neither pose nor odometry");
+// Reads the entries of a list.
+// @param read  gets an empty entry, its node and its place
+template <class Entry, class Read>
+Result<void> each(const Section& section, const std::string& what, std::vector<Entry>& all,
+                  Read read) {
+  if (!section.node.IsSequence()) {
+    return Scalars(section.file).error(Errc::kConfig, section.node.Mark(), what + " is not a list");
+  }
+  for (std::size_t i = 0; i < section.node.size(); ++i) {
+    auto& entry = all.emplace_back();
+    const auto ok = read(entry, section.node[i], what + "[" + std::to_string(i) + "]");
+    if (!ok) return ok;
+  }
+  return {};
 }
 
-Result<void> Reader::poses_in(const YAML::Node& node, Settings& settings) const {
-  if (!node.IsSequence()) return error(Errc::kConfig, node.Mark(), "poses_in is not a list");
-  constexpr std::array<Keys, 5> kKeys = {"topic", "type", "child", "gate", "correlated"};
-  for (std::size_t i = 0; i < node.size(); ++i) {
-    const std::string what = "poses_in[" + std::to_string(i) + "]";
-    const auto entries = fields(node[i], kKeys, what);
-    if (!entries) return tl::unexpected(entries.error());
-    PoseIn in;
-    std::string type = "pose";
+Result<void> poses_in(const Section& section, Settings& settings) {
+  constexpr std::array<Key, 5> kKeys = {"topic", "type", "child", "gate", "correlated"};
+  const auto read = [&](PoseIn& in, const YAML::Node& node, const std::string& place) {
     bool correlated = false;
-    auto ok =
-        require(node[i], *entries, "topic", what)
-            .and_then([&] { return words(*entries, "topic", what, in.topic); })
-            .and_then([&] { return words(*entries, "type", what, type); })
-            .and_then([&] { return words(*entries, "child", what, in.child); })
-            .and_then([&] { return within(*entries, "gate", what, 1e-9, 1, in.options.gate); })
-            .and_then([&] { return flag(*entries, "correlated", what, correlated); });
-    if (!ok) return ok;
-    if (ok = is_odometry(node[i], what, type, in.odometry); !ok) return ok;
+    Mapping entries(section.file, node, kKeys, place);
+    entries.require("topic")
+        .words("topic", in.topic)
+        .words("child", in.child)
+        .within("gate", 1e-9, 1, in.options.gate)
+        .flag("correlated", correlated)
+        .type(in.odometry);
+    entries.check(in.odometry == in.child.empty(), Errc::kInvalidInput,
+                  in.odometry ? ": odometry names the child itself"
+                              : ": child is missing, the frame that is measured");
     in.options.independent = !correlated;
-    if (in.odometry == in.child.empty()) {
-      settings.poses_in.push_back(std::move(in));
-      continue;
-    }
-    return error(Errc::kInvalidInput, node[i].Mark(),
-                 what + (in.odometry ? ": odometry names the child itself"
-                                     : ": child is missing, the frame that is measured"));
-  }
-  return {};
+    return entries.result();
+  };
+  return each(section, "poses_in", settings.poses_in, read);
 }
 
-Result<void> Reader::poses_out(const YAML::Node& node, Settings& settings) const {
-  if (!node.IsSequence()) return error(Errc::kConfig, node.Mark(), "poses_out is not a list");
-  constexpr std::array<Keys, 5> kKeys = {"topic", "type", "frame", "child", "rate"};
-  for (std::size_t i = 0; i < node.size(); ++i) {
-    const std::string what = "poses_out[" + std::to_string(i) + "]";
-    const auto entries = fields(node[i], kKeys, what);
-    if (!entries) return tl::unexpected(entries.error());
-    PoseOut out;
-    std::string type = "pose";
-    auto ok = require(node[i], *entries, "topic", what)
-                  .and_then([&] { return require(node[i], *entries, "frame", what); })
-                  .and_then([&] { return require(node[i], *entries, "child", what); })
-                  .and_then([&] { return words(*entries, "topic", what, out.topic); })
-                  .and_then([&] { return words(*entries, "frame", what, out.frame); })
-                  .and_then([&] { return words(*entries, "child", what, out.child); })
-                  .and_then([&] { return within(*entries, "rate", what, 0, kMaxRate, out.rate); });
-    if (ok) ok = words(*entries, "type", what, type);
-    if (ok) ok = is_odometry(node[i], what, type, out.odometry);
-    if (!ok) return ok;
-    settings.poses_out.push_back(std::move(out));
-  }
-  return {};
+Result<void> poses_out(const Section& section, Settings& settings) {
+  constexpr std::array<Key, 5> kKeys = {"topic", "type", "frame", "child", "rate"};
+  const auto read = [&](PoseOut& out, const YAML::Node& node, const std::string& place) {
+    return Mapping(section.file, node, kKeys, place)
+        .require("topic")
+        .require("frame")
+        .require("child")
+        .words("topic", out.topic)
+        .words("frame", out.frame)
+        .words("child", out.child)
+        .within("rate", 0, kMaxRate, out.rate)
+        .type(out.odometry)
+        .result();
+  };
+  return each(section, "poses_out", settings.poses_out, read);
 }
 
-Result<void> Reader::read(const YAML::Node& root, Settings& settings) const {
-  static constexpr std::array<std::pair<Keys, Section>, 8> kSections = {{
-      {"tf_in", &Reader::tf_in},
-      {"tf_out", &Reader::tf_out},
-      {"joints_in", &Reader::joints_in},
-      {"joints_out", &Reader::joints_out},
-      {"description_in", &Reader::description_in},
-      {"description_out", &Reader::description_out},
-      {"poses_in", &Reader::poses_in},
-      {"poses_out", &Reader::poses_out},
-  }};
-  constexpr std::array<Keys, 12> kKeys = {
+Result<void> read(const YAML::Node& root, const std::string& file, Settings& settings) {
+  static constexpr std::array<std::pair<Key, Result<void> (*)(const Section&, Settings&)>, 8>
+      kSections = {{{"tf_in", tf_in},
+                    {"tf_out", tf_out},
+                    {"joints_in", joints_in},
+                    {"joints_out", joints_out},
+                    {"description_in", description_in},
+                    {"description_out", description_out},
+                    {"poses_in", poses_in},
+                    {"poses_out", poses_out}}};
+  constexpr std::array<Key, 12> kKeys = {
       "partition", "clock",      "ros_domain",     "prefix",          "tf_in",    "tf_out",
       "joints_in", "joints_out", "description_in", "description_out", "poses_in", "poses_out"};
-  const std::string place = "the file";
-  const auto entries = fields(root, kKeys, place);
-  if (!entries) return tl::unexpected(entries.error());
   double domain = settings.ros_domain;
   std::string prefix;
   std::string clock = "system";
-  auto ok = words(*entries, "partition", place, settings.partition)
-                .and_then([&] { return within(*entries, "ros_domain", place, 0, 232, domain); })
-                .and_then([&] { return words(*entries, "prefix", place, prefix); })
-                .and_then([&] { return words(*entries, "clock", place, clock); });
-  if (!ok) return ok;
+  Mapping entries(file, root, kKeys, "the file");
+  entries.words("partition", settings.partition)
+      .within("ros_domain", 0, 232, domain)
+      .words("prefix", prefix)
+      .words("clock", clock);
+  if (!entries.result()) return entries.result();
   if (clock != "system" && clock != "external" && clock != "ros") {
-    return error(Errc::kInvalidInput, entries->find("clock")->second.mark,
-                 "clock must be system, external or ros, not " + tfdude::quote(clock));
+    return entries
+        .fail(Errc::kInvalidInput,
+              "clock must be system, external or ros, not " + tfdude::quote(clock), "clock")
+        .result();
   }
   if (clock != "system") settings.options.clock = ClockKind::kExternal;
   settings.passes_clock = clock == "ros";
   settings.ros_domain = static_cast<std::uint32_t>(domain);
   for (const auto& [key, section] : kSections) {
-    const auto found = entries->find(key);
-    if (found == entries->end()) continue;
-    if (ok = (this->*section)(found->second.value, settings); !ok) return ok;
+    const YAML::Node* node = entries.value(key);
+    if (node == nullptr) continue;
+    if (auto ok = section({*node, file}, settings); !ok) return ok;
   }
   set_prefix(prefix, settings);
   return {};
@@ -351,9 +325,8 @@ Result<void> Reader::read(const YAML::Node& root, Settings& settings) const {
 }  // namespace
 
 Result<void> parse_config(const std::string& text, const std::string& name, Settings& settings) {
-  const Reader reader(name);
-  return reader.read_document(text,
-                              [&](const YAML::Node& root) { return reader.read(root, settings); });
+  return Scalars(name).read_document(
+      text, [&](const YAML::Node& root) { return read(root, name, settings); });
 }
 
 Result<void> load_config(const std::string& path, Settings& settings) {

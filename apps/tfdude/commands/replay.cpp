@@ -99,11 +99,37 @@ class Replay {
     options_.history.max_ahead = std::chrono::nanoseconds::max();
   }
 
-  void pause(bool paused);
+  void pause(bool paused) { pace_.pause(paused); }
+
   // Serves what was there at the start.
-  [[nodiscard]] Result<void> begin();
+  [[nodiscard]] Result<void> begin() {
+    if (auto ok = publish_clock(start_); !ok) return ok;
+    if (auto ok = show_state(); !ok) return ok;
+    pace_.set(start_);
+    return {};
+  }
+
   // Until the end, or until interrupted.
-  [[nodiscard]] Result<void> run();
+  [[nodiscard]] Result<void> run() {
+    Keys keys;
+    while (!interrupted_within(kStep)) {
+      while (const auto key = keys.next()) on_key(*key);
+      const Time due = std::min(pace_.now(), end_);
+      if (auto ok = apply_due(due); !ok) return ok;
+      if (auto ok = settle(); !ok) return ok;
+      if (Steady::now() - shown_ >= kRepeatEvery) show_joints();
+      if (Steady::now() - published_ >= (pace_.paused() ? kRepeatEvery : kClockEvery)) {
+        if (auto ok = publish_clock(due); !ok) return ok;
+      }
+      if (pace_.paused() || !upcoming_.empty() || due < end_) continue;
+      if (!loop_) return publish_clock(end_);
+      if (interrupted_within(kClockDelay)) return {};
+      if (auto ok = set_back(); !ok) return ok;
+      if (interrupted_within(kClockDelay)) return {};
+      if (auto ok = begin(); !ok) return ok;
+    }
+    return {};
+  }
 
   [[nodiscard]] std::size_t rejected() const {
     std::size_t sum = rejected_;
@@ -123,17 +149,131 @@ class Replay {
     std::optional<ReplayedPartition> served;
   };
 
-  [[nodiscard]] Result<void> show_state();
-  [[nodiscard]] Result<void> open(const std::string& name, One& one);
-  [[nodiscard]] Result<void> apply(const RecordedNews& recorded);
-  [[nodiscard]] Result<void> apply_due(Time due);
-  [[nodiscard]] Result<void> settle();
-  void show_joints();
-  [[nodiscard]] Result<void> set_back();
-  void close(One& one);
-  void fetch();
-  [[nodiscard]] Result<void> publish_clock(Time now);
-  void on_key(char key);
+  void fetch() { upcoming_ = recording_.next(); }
+
+  [[nodiscard]] Result<void> publish_clock(Time now) {
+    published_ = Steady::now();
+    return clock_.publish_clock(now);
+  }
+
+  void close(One& one) {
+    if (one.served) rejected_ += one.served->rejected();
+    one.served.reset();
+  }
+
+  // Takes half a second, in which the replay stands still.
+  [[nodiscard]] Result<void> open(const std::string& name, One& one) {
+    const FramesNews* frames = nullptr;
+    ValuesNews values;
+    const auto state = recording_.state();
+    for (const PartitionNews& news : state) {
+      if (news.partition != name) continue;
+      if (const auto* found = std::get_if<FramesNews>(&news.what)) frames = found;
+      if (const auto* found = std::get_if<ValuesNews>(&news.what)) values = *found;
+    }
+    if (frames == nullptr || frames->frames.empty()) return {};
+    const Time at = pace_.now();
+    auto served = ReplayedPartition::open(name, *frames, values, options_);
+    pace_.set(at);
+    if (!served) return tl::unexpected(std::move(served.error()));
+    one.served.emplace(*std::move(served));
+    return {};
+  }
+
+  // At the start, also when it is reached again.
+  [[nodiscard]] Result<void> show_state() {
+    recording_.seek(start_);
+    const auto state = recording_.state();
+    for (auto& [name, one] : partitions_) one.reachable = false;
+    for (const PartitionNews& news : state) {
+      One& one = partitions_[news.partition];
+      if (const auto* reach = std::get_if<ReachNews>(&news.what)) {
+        one.reachable = reach->reachable;
+      } else if (!one.served || !one.reachable) {
+        continue;
+      } else if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
+        one.served->apply(*frames);
+      } else if (auto ok = one.served->apply(std::get<ValuesNews>(news.what)); !ok) {
+        return ok;
+      }
+    }
+    for (auto& [name, one] : partitions_) {
+      if (!one.reachable) close(one);
+      if (!one.reachable || one.served) continue;
+      if (auto ok = open(name, one); !ok) return ok;
+    }
+    fetch();
+    return {};
+  }
+
+  [[nodiscard]] Result<void> apply(const RecordedNews& recorded) {
+    const PartitionNews& news = recorded.news;
+    One& one = partitions_[news.partition];
+    if (const auto* reach = std::get_if<ReachNews>(&news.what)) {
+      if (reach->reachable && !one.reachable) one.since = recorded.time;
+      one.reachable = reach->reachable;
+      if (!one.reachable) close(one);
+      return {};
+    }
+    if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
+      one.since = recorded.time;
+      if (one.served) one.served->apply(*frames);
+      return {};
+    }
+    if (!one.reachable) return {};
+    if (!one.served) return open(news.partition, one);
+    return one.served->apply(std::get<ValuesNews>(news.what));
+  }
+
+  // Frames without values.
+  [[nodiscard]] Result<void> settle() {
+    const Time now = recording_.instant();
+    for (auto& [name, one] : partitions_) {
+      if (!one.reachable || now - one.since < kSettle) continue;
+      if (one.served && !one.served->settled()) one.served->settle();
+      if (one.served) continue;
+      one.since = now;
+      if (auto ok = open(name, one); !ok) return ok;
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<void> apply_due(Time due) {
+    while (!upcoming_.empty() && upcoming_.front().time <= due) {
+      for (const RecordedNews& news : upcoming_) {
+        if (auto ok = apply(news); !ok) return ok;
+      }
+      if (Steady::now() - published_ >= kClockEvery) {
+        if (auto ok = publish_clock(upcoming_.front().time); !ok) return ok;
+      }
+      fetch();
+    }
+    return {};
+  }
+
+  void on_key(char key) {
+    if (key != ' ') return;
+    pause(!pace_.paused());
+    std::fputs(pace_.paused() ? "tfdude: paused\n" : "tfdude: going on\n", stderr);
+  }
+
+  void show_joints() {
+    shown_ = Steady::now();
+    for (auto& [name, one] : partitions_) {
+      if (!one.served) continue;
+      if (auto joints = recording_.joints(name)) one.served->show(*std::move(joints));
+    }
+  }
+
+  // First in the partitions of this process, which expect the time to jump back.
+  [[nodiscard]] Result<void> set_back() {
+    std::fputs("tfdude: from the beginning\n", stderr);
+    for (auto& [name, one] : partitions_) {
+      if (!one.served) continue;
+      if (auto ok = one.served->set_time(start_); !ok) return ok;
+    }
+    return publish_clock(start_);
+  }
 
   Recording& recording_;
   Client& clock_;
@@ -148,162 +288,6 @@ class Replay {
   Steady::time_point shown_{};  // the joints
   std::size_t rejected_ = 0;
 };
-
-Result<void> Replay::publish_clock(Time now) {
-  published_ = Steady::now();
-  return clock_.publish_clock(now);
-}
-
-void Replay::fetch() { upcoming_ = recording_.next(); }
-
-void Replay::close(One& one) {
-  if (one.served) rejected_ += one.served->rejected();
-  one.served.reset();
-}
-
-// Takes half a second, in which the replay stands still.
-Result<void> Replay::open(const std::string& name, One& one) {
-  const FramesNews* frames = nullptr;
-  ValuesNews values;
-  const auto state = recording_.state();
-  for (const PartitionNews& news : state) {
-    if (news.partition != name) continue;
-    if (const auto* found = std::get_if<FramesNews>(&news.what)) frames = found;
-    if (const auto* found = std::get_if<ValuesNews>(&news.what)) values = *found;
-  }
-  if (frames == nullptr || frames->frames.empty()) return {};
-  const Time at = pace_.now();
-  auto served = ReplayedPartition::open(name, *frames, values, options_);
-  pace_.set(at);
-  if (!served) return tl::unexpected(std::move(served.error()));
-  one.served.emplace(*std::move(served));
-  return {};
-}
-
-// At the start, also when it is reached again.
-Result<void> Replay::show_state() {
-  recording_.seek(start_);
-  const auto state = recording_.state();
-  for (auto& [name, one] : partitions_) one.reachable = false;
-  for (const PartitionNews& news : state) {
-    One& one = partitions_[news.partition];
-    if (const auto* reach = std::get_if<ReachNews>(&news.what)) {
-      one.reachable = reach->reachable;
-    } else if (!one.served || !one.reachable) {
-      continue;
-    } else if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
-      one.served->apply(*frames);
-    } else if (auto ok = one.served->apply(std::get<ValuesNews>(news.what)); !ok) {
-      return ok;
-    }
-  }
-  for (auto& [name, one] : partitions_) {
-    if (!one.reachable) close(one);
-    if (!one.reachable || one.served) continue;
-    if (auto ok = open(name, one); !ok) return ok;
-  }
-  fetch();
-  return {};
-}
-
-Result<void> Replay::begin() {
-  if (auto ok = publish_clock(start_); !ok) return ok;
-  if (auto ok = show_state(); !ok) return ok;
-  pace_.set(start_);
-  return {};
-}
-
-Result<void> Replay::apply(const RecordedNews& recorded) {
-  const PartitionNews& news = recorded.news;
-  One& one = partitions_[news.partition];
-  if (const auto* reach = std::get_if<ReachNews>(&news.what)) {
-    if (reach->reachable && !one.reachable) one.since = recorded.time;
-    one.reachable = reach->reachable;
-    if (!one.reachable) close(one);
-    return {};
-  }
-  if (const auto* frames = std::get_if<FramesNews>(&news.what)) {
-    one.since = recorded.time;
-    if (one.served) one.served->apply(*frames);
-    return {};
-  }
-  if (!one.reachable) return {};
-  if (!one.served) return open(news.partition, one);
-  return one.served->apply(std::get<ValuesNews>(news.what));
-}
-
-// Frames without values.
-Result<void> Replay::settle() {
-  const Time now = recording_.instant();
-  for (auto& [name, one] : partitions_) {
-    if (!one.reachable || now - one.since < kSettle) continue;
-    if (one.served && !one.served->settled()) one.served->settle();
-    if (one.served) continue;
-    one.since = now;
-    if (auto ok = open(name, one); !ok) return ok;
-  }
-  return {};
-}
-
-Result<void> Replay::apply_due(Time due) {
-  while (!upcoming_.empty() && upcoming_.front().time <= due) {
-    for (const RecordedNews& news : upcoming_) {
-      if (auto ok = apply(news); !ok) return ok;
-    }
-    if (Steady::now() - published_ >= kClockEvery) {
-      if (auto ok = publish_clock(upcoming_.front().time); !ok) return ok;
-    }
-    fetch();
-  }
-  return {};
-}
-
-void Replay::pause(bool paused) { pace_.pause(paused); }
-
-void Replay::on_key(char key) {
-  if (key != ' ') return;
-  pause(!pace_.paused());
-  std::fputs(pace_.paused() ? "tfdude: paused\n" : "tfdude: going on\n", stderr);
-}
-
-void Replay::show_joints() {
-  shown_ = Steady::now();
-  for (auto& [name, one] : partitions_) {
-    if (!one.served) continue;
-    if (auto joints = recording_.joints(name)) one.served->show(*std::move(joints));
-  }
-}
-
-// First in the partitions of this process, which expect the time to jump back.
-Result<void> Replay::set_back() {
-  std::fputs("tfdude: from the beginning\n", stderr);
-  for (auto& [name, one] : partitions_) {
-    if (!one.served) continue;
-    if (auto ok = one.served->set_time(start_); !ok) return ok;
-  }
-  return publish_clock(start_);
-}
-
-Result<void> Replay::run() {
-  Keys keys;
-  while (!interrupted_within(kStep)) {
-    while (const auto key = keys.next()) on_key(*key);
-    const Time due = std::min(pace_.now(), end_);
-    if (auto ok = apply_due(due); !ok) return ok;
-    if (auto ok = settle(); !ok) return ok;
-    if (Steady::now() - shown_ >= kRepeatEvery) show_joints();
-    if (Steady::now() - published_ >= (pace_.paused() ? kRepeatEvery : kClockEvery)) {
-      if (auto ok = publish_clock(due); !ok) return ok;
-    }
-    if (pace_.paused() || !upcoming_.empty() || due < end_) continue;
-    if (!loop_) return publish_clock(end_);
-    if (interrupted_within(kClockDelay)) return {};
-    if (auto ok = set_back(); !ok) return ok;
-    if (interrupted_within(kClockDelay)) return {};
-    if (auto ok = begin(); !ok) return ok;
-  }
-  return {};
-}
 
 // @return kPartitionTaken: a live partition has the name of a recorded one
 Result<void> check_names(Client& client, const Recording& recording) {
