@@ -5,15 +5,10 @@
 #include <string>
 #include <string_view>
 
+#include "base/byte_order.hpp"
+
 // Little-endian numbers in byte strings, as MCAP has them.
 namespace tfdude::recording {
-
-template <class Number>
-void put_number(char* to, Number value) {
-  for (std::size_t i = 0; i < sizeof value; ++i) {
-    to[i] = static_cast<char>(static_cast<std::uint64_t>(value) >> (8 * i));
-  }
-}
 
 /// Appends to a string.
 class ByteWriter {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/topics.hpp"
 
@@ -21,43 +21,36 @@ bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload,
                                       const FilterSampleInfo& info, const GUID_t&) const {
   if (!view_.admits(info)) return false;
   view_.counters.requests_arrived.fetch_add(1, std::memory_order_relaxed);
-  RequestHead head;
-  if (!read_request_head(payload.data, payload.length, head)) {
+  const auto head = read_request_head(payload.data, payload.length);
+  if (!head) {
     count_malformed(view_.counters, kRequestTopic);
     return false;
   }
-  const bool passes = head.addressee == view_.addressee || view_.handler.owns(head.id);
+  const bool passes = head->addressee == view_.addressee || view_.handler.owns(head->id);
   if (passes) view_.counters.requests_passed.fetch_add(1, std::memory_order_relaxed);
+  return passes;
+}
+
+bool OwnedFilters::View::pass(std::optional<bool> concerned, const char* topic) const {
+  counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
+  if (!concerned) count_malformed(counters, topic);
+  const bool passes = concerned.value_or(false);
+  if (passes) counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
   return passes;
 }
 
 bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                     const GUID_t&) const {
   if (!view_.admits(info)) return false;
-  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
-  if (!well_formed_joints(payload.data, payload.length)) {
-    count_malformed(view_.counters, kJointTopic);
-    return false;
-  }
-  const bool passes = any_joint(payload.data, payload.length, [this](std::string_view name) {
-    return view_.handler.owns_joint(name);
-  });
-  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
-  return passes;
+  const auto owns = [this](std::string_view name) { return view_.handler.owns_joint(name); };
+  return view_.pass(any_joint(payload.data, payload.length, owns), kJointTopic);
 }
 
 bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                      const GUID_t&) const {
   if (!view_.admits(info)) return false;
-  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
-  if (!well_formed_update(payload.data, payload.length)) {
-    count_malformed(view_.counters, kUpdateTopic);
-    return false;
-  }
-  const bool passes = any_edge(payload.data, payload.length,
-                               [this](std::string_view id) { return view_.handler.owns(id); });
-  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
-  return passes;
+  const auto owns = [this](std::string_view id) { return view_.handler.owns(id); };
+  return view_.pass(any_edge(payload.data, payload.length, owns), kUpdateTopic);
 }
 
 ReturnCode OwnedFilters::create_content_filter(const char* filter_class_name, const char* type_name,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "tfdude/transport/fastdds.hpp"
@@ -16,10 +17,10 @@
 namespace tfdude::fastdds {
 
 /// The filters of a partition's readers. They pass messages about a frame or joint that the
-/// partition owns, and requests addressed to it by name. They drop messages that are not well
-/// formed, and those of senders that flood it. They are evaluated at the reader, on the bytes,
-/// against the current set of owned frames: the announced expression, the partition's name, never
-/// changes.
+/// partition owns, and requests addressed to it by name. They drop the messages of senders that
+/// flood it. They are evaluated at the reader, on the bytes, against the current set of owned
+/// frames: the announced expression, the partition's name, never changes. They read no more than
+/// they need: what passes is checked as a whole before it is deserialized (CheckedType).
 class OwnedFilters final : public edds::IContentFilterFactory {
  public:
   /// The name under which the class is registered and announced.
@@ -46,6 +47,9 @@ class OwnedFilters final : public edds::IContentFilterFactory {
 
     /// Whether the sender has not taken too much time already.
     [[nodiscard]] bool admits(const edds::IContentFilter::FilterSampleInfo& info) const;
+    /// Counts a stream's sample, and says whether it passes.
+    /// @param concerned  whether the partition owns some of it; nothing: it is malformed
+    [[nodiscard]] bool pass(std::optional<bool> concerned, const char* topic) const;
   };
 
   class Requests final : public edds::IContentFilter {
