@@ -35,12 +35,9 @@ struct FirstEdge : GivenTransform {
   }
 };
 
-constexpr auto kEdge =
-    record(TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD(x_pc, X_PC, GivenTransform()));
-
 constexpr auto kUpdate =
     record(TFDUDE_FIELD(x_pc, edges, FirstEdge()), TFDUDE_FIELD(stamp, stamp, Stamp("a stamp")),
-           TFDUDE_FIELD(more, edges, List(kEdge, kMaxItems, 1)));
+           TFDUDE_FIELD(more, edges, List(GivenEdge(), kMaxItems, 1)));
 
 constexpr auto kPartialEdge =
     record(TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELDS(X_PC, PartialNumbers()));

@@ -12,8 +12,7 @@ namespace {
 
 // ---- updates
 
-constexpr auto kEdges = List(record(TFDUDE_FIELD(id, id, FrameId()),  //
-                                    TFDUDE_FIELD(x_pc, X_PC, GivenTransform())));
+constexpr auto kEdges = List(GivenEdge());
 constexpr Stamp kUpdateStamp("the stamp of an update");
 constexpr auto kUpdate = record(TFDUDE_FIELD(edges, edges, kEdges),  //
                                 TFDUDE_FIELD(stamp, stamp, kUpdateStamp));

@@ -30,8 +30,7 @@ constexpr auto kEntry =
 
 constexpr auto kTombstone =
     record(TFDUDE_FIELD(lamport_time, lamport_time, Count64()),
-           TFDUDE_FIELD(kind, kind,
-                        (Enumerated<Tombstone::Kind>{Tombstone::Kind::kDropped, "a tombstone"})),
+           TFDUDE_FIELD(kind, kind, Enumerated(Tombstone::Kind::kDropped, "a tombstone")),
            TFDUDE_FIELD(id, id, Id("id")), TFDUDE_FIELD(rival, rival, PartitionName(true)));
 
 constexpr auto kPageEpoch =
@@ -47,11 +46,11 @@ constexpr auto kPage = record(
     TFDUDE_FIELD(tombstones, tombstones, List(kTombstone)),
     TFDUDE_FIELD(others, others, List(kPageEpoch)), TFDUDE_FIELD(joints, joints, List(kPageJoint)));
 
-constexpr auto kAbsent = record(
-    TFDUDE_FIELD(since, since, Number<std::int64_t>()),
-    TFDUDE_FIELD(incarnation, incarnation, Count64()),
-    TFDUDE_FIELD(kind, kind, (Enumerated<Absent::Kind>{Absent::Kind::kForgotten, "an absence"})),
-    TFDUDE_FIELD(partition, partition, PartitionName()));
+constexpr auto kAbsent =
+    record(TFDUDE_FIELD(since, since, Number<std::int64_t>()),
+           TFDUDE_FIELD(incarnation, incarnation, Count64()),
+           TFDUDE_FIELD(kind, kind, Enumerated(Absent::Kind::kForgotten, "an absence")),
+           TFDUDE_FIELD(partition, partition, PartitionName()));
 
 constexpr auto kPresence = record(
     TFDUDE_FIELD(partition, partition, PartitionName()),

@@ -80,6 +80,7 @@ template <class Enum>
 struct Enumerated {
   Enum last;
   const char* of;
+  constexpr Enumerated(Enum its_last, const char* what) : last(its_last), of(what) {}
 
   static void check(CdrReader& in) { Octet::check(in); }
   static void write(Enum value, std::uint8_t& wire) { Octet::write(value, wire); }

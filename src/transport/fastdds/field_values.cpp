@@ -86,6 +86,21 @@ Result<void> ComputedTransform::read(const Numbers& wire, Transform& X, const Pl
   return put(read_computed(wire), X, place);
 }
 
+namespace {
+
+constexpr auto kEdge =
+    record(TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD(x_pc, X_PC, GivenTransform()));
+
+}  // namespace
+
+void GivenEdge::check(CdrReader& in) { kEdge.check(in); }
+
+void GivenEdge::write(const EdgeUpdate& edge, wire::Edge& wire) { kEdge.write(edge, wire); }
+
+Result<void> GivenEdge::read(const wire::Edge& wire, EdgeUpdate& edge, const Place& place) {
+  return kEdge.read(wire, edge, place);
+}
+
 // ---- parts of transforms
 
 namespace {

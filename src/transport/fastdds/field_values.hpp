@@ -41,6 +41,13 @@ struct ComputedTransform {
   static Result<void> read(const Numbers& wire, Transform& X, const Place& place);
 };
 
+/// An edge by its child frame, with such a transform.
+struct GivenEdge {
+  static void check(CdrReader& in);
+  static void write(const EdgeUpdate& edge, wire::Edge& wire);
+  static Result<void> read(const wire::Edge& wire, EdgeUpdate& edge, const Place& place);
+};
+
 /// Parts of a transform, in two fields: which ones are given, as bits, and the numbers, of which
 /// the others are ignored.
 struct PartialNumbers {
@@ -75,14 +82,14 @@ struct AnyCorrelation {
                            const Place& place);
 };
 
-/// Samples with one stamp.
+/// Samples with one stamp (codec_streams.cpp).
 struct JointSamples {
   static void check(CdrReader& in);
   static void write(const JointUpdate& update, wire::Joints& wire);
   static Result<void> read(const wire::Joints& wire, JointUpdate& update, const Place&);
 };
 
-/// What a watcher is sent.
+/// What a watcher is sent (codec_streams.cpp).
 struct Pushed {
   static void check(CdrReader& in);
   static void write(const PushedValues& pushed, wire::State& wire);

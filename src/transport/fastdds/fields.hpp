@@ -40,13 +40,12 @@ struct Record {
   template <class Wire, class Message>
   Result<void> read(const Wire& wire, Message& message, Place place) const {
     Result<void> ok;
-    std::apply(
-        [&](const Fields&... field) {
-          (void)((ok = field.kind.read(field.of_wire(wire), field.of_message(message), place),
-                  ok.has_value()) &&
-                 ...);
-        },
-        fields);
+    const auto read_one = [&](const auto& field) {
+      auto one = field.kind.read(field.of_wire(wire), field.of_message(message), place);
+      if (!one) ok = std::move(one);
+      return ok.has_value();
+    };
+    std::apply([&](const Fields&... field) { (void)(read_one(field) && ...); }, fields);
     return ok;
   }
 };

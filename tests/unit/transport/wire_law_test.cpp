@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <cstring>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/same_messages.hpp"
 #include "support/samples.hpp"
 
 namespace tfdude::fastdds {
@@ -98,17 +100,18 @@ std::vector<JointValue> random_joints(Random& random, std::size_t least) {
 }
 
 ReviseRequest random_revision(Random& random) {
-  return {several(random, 1,
-                  [&] {
-                    ReviseRequest::Edge edge{random_name(random), {1, random.normal(), 3}};
-                    edge.refused = random.index(2) == 0;
-                    if (random.index(2) == 0) {
-                      edge.revision =
-                          Revision{edge.id, random_transform(random), random_correlation(random)};
-                    }
-                    return edge;
-                  }),
-          random_stamp(random), random_count(random), random_count(random)};
+  return {
+      several(random, 1,
+              [&] {
+                ReviseRequest::Edge edge{random_name(random), {1, random.normal(), 3}, false, {}};
+                edge.refused = random.index(2) == 0;
+                if (random.index(2) == 0) {
+                  edge.revision =
+                      Revision{edge.id, random_transform(random), random_correlation(random)};
+                }
+                return edge;
+              }),
+      random_stamp(random), random_count(random), random_count(random)};
 }
 
 std::vector<Request> random_requests(Random& random) {
@@ -276,6 +279,14 @@ bool same(const Bytes& a, const Bytes& b) {
   return true;
 }
 
+// Whether there is an example of each kind.
+template <class Message>
+bool has_all_kinds(const std::vector<Message>& examples) {
+  std::set<std::size_t> kinds;
+  for (const Message& one : examples) kinds.insert(one.body.index());
+  return kinds.size() == std::variant_size_v<decltype(Message::body)>;
+}
+
 template <class Type, class Sample, class Decode, class Encode>
 void check_law(const Sample& sent, bool (*check)(const std::uint8_t*, std::size_t), Decode decode,
                Encode encode) {
@@ -302,14 +313,19 @@ TEST_CASE("random messages of every kind pass their check, cut ones do not, and 
   wire::Request request;  // used again and again, as is the reply: nothing of before may be left
   wire::Reply reply;
   for (int round = 0; round < kRounds; ++round) {
-    for (const Request& one : random_requests(random)) {
+    const auto requests = random_requests(random);
+    REQUIRE(has_all_kinds(requests));
+    for (const Request& one : requests) {
       INFO("request " << one.body.index() << " of round " << round);
       write_wire(one, "robot", request);
       CHECK(serialized<RequestType>(request) == serialized<RequestType>(to_wire(one, "robot")));
       check_law<RequestType>(request, well_formed_request, decode,
                              [](const Request& message) { return to_wire(message, "robot"); });
+      testing::check_same(from_wire(request).value(), one);
     }
-    for (const Reply& one : random_replies(random)) {
+    const auto replies = random_replies(random);
+    REQUIRE(has_all_kinds(replies));
+    for (const Reply& one : replies) {
       INFO("reply " << one.body.index() << " of round " << round);
       write_wire(one, reply);
       CHECK(serialized<ReplyType>(reply) == serialized<ReplyType>(to_wire(one)));
@@ -319,7 +335,9 @@ TEST_CASE("random messages of every kind pass their check, cut ones do not, and 
                           well_formed_update, decode_all, encode);
     check_law<JointsType>(to_wire(JointUpdate{random_joints(random, 0), random_stamp(random)}),
                           well_formed_joints, decode_all, encode);
-    check_law<StateType>(to_wire(random_pushed(random)), well_formed_state, decode, encode);
+    const PushedValues pushed = random_pushed(random);
+    check_law<StateType>(to_wire(pushed), well_formed_state, decode, encode);
+    testing::check_same(from_wire(to_wire(pushed)).value(), pushed);
     check_law<PageType>(to_wire(random_page(random)), well_formed_page, decode, encode);
     check_law<PresenceType>(to_wire(random_presence(random)), well_formed_presence, decode, encode);
   }
