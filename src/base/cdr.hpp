@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "base/byte_order.hpp"
+#include "base/bytes.hpp"
 
 // Plain CDR (XCDR1), as DDS and ROS 2 send and record it. Each number stands at a multiple of its
 // size, counted from the end of the head: two bytes of kind (0: big-endian, 1: little-endian) and
