@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "../rendering/json.hpp"
+#include "types/ros_tf.hpp"
 
 namespace tfdude::web::foxglove {
 namespace {
@@ -44,60 +45,6 @@ json sphere_json(const Transform& X_RF) {
           {"size", vector_json(diameters)},
           {"color", {{"r", 0.49}, {"g", 0.61}, {"b", 1.0}, {"a", 0.35}}}};
 }
-
-// Writes CDR: each number at a multiple of its size from the end of the header.
-class Cdr {
- public:
-  Cdr() : bytes_(kHeader, '\0') { bytes_[1] = 1; }
-
-  template <class T>
-  void put(T value) {
-    while ((bytes_.size() - kHeader) % sizeof(T) != 0) bytes_.push_back('\0');
-    char raw[sizeof(T)];
-    std::memcpy(raw, &value, sizeof(T));
-    bytes_.append(raw, sizeof(T));
-  }
-  void put_text(const std::string& text) {
-    put(static_cast<std::uint32_t>(text.size() + 1));
-    bytes_.append(text.c_str(), text.size() + 1);
-  }
-  [[nodiscard]] std::string take() { return std::move(bytes_); }
-
- private:
-  static constexpr std::size_t kHeader = 4;
-  std::string bytes_;
-};
-
-constexpr const char* kTfText = R"(geometry_msgs/TransformStamped[] transforms
-================================================================================
-MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-geometry_msgs/Transform transform
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Transform
-geometry_msgs/Vector3 translation
-geometry_msgs/Quaternion rotation
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-)";
 
 json object(const char* title, json properties) {
   return {{"title", title}, {"type", "object"}, {"properties", std::move(properties)}};
@@ -172,19 +119,11 @@ std::string frame_transforms(const std::vector<Edge>& edges) {
 }
 
 std::string tf_message(const std::vector<Edge>& edges) {
-  Cdr cdr;
-  cdr.put(static_cast<std::uint32_t>(edges.size()));
-  for (const Edge& edge : edges) {
-    const std::int64_t ns = nanoseconds(edge.stamp);
-    cdr.put(static_cast<std::int32_t>(ns / kSecond));
-    cdr.put(static_cast<std::uint32_t>(ns % kSecond));
-    cdr.put_text(edge.parent);
-    cdr.put_text(edge.child);
-    const Eigen::Vector3d p = edge.X_PC.translation();
-    const Eigen::Quaterniond q = edge.X_PC.rotation();
-    for (const double number : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) cdr.put(number);
-  }
-  return cdr.take();
+  std::string message;
+  ros::TfEncoder encoder(message);
+  for (const Edge& edge : edges) encoder.add(edge.parent, edge.child, edge.X_PC, edge.stamp);
+  encoder.finish();
+  return message;
 }
 
 std::string scene_update(const std::vector<Ellipsoid>& ellipsoids, Time now, bool all) {
@@ -232,7 +171,7 @@ json channel(std::uint32_t id, const std::string& topic, const std::string& sche
           {"topic", topic},
           {"encoding", ros ? "cdr" : "json"},
           {"schemaName", schema},
-          {"schema", ros ? std::string(kTfText) : schema_json(schema).dump()},
+          {"schema", ros ? std::string(ros::kTfDefinition) : schema_json(schema).dump()},
           {"schemaEncoding", ros ? "ros2msg" : "jsonschema"}};
 }
 

@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
           [&] { bench::check(client.update(kFrame, X), "update"); });
   compare("lookup",
           bench::sizes_of({1, kFrame, tfdude::LookupRequest{{{kFrom, kFrame}}}}, kPartition,
-                          {1, 0, tfdude::SegmentValues{{X}, {}, {}, {}}}),
+                          {1, 0, tfdude::SegmentValues{{{X}}, {}, {}, {}}}),
           [&] { bench::check(client.lookup(kFrom, kFrame), "lookup"); });
   return 0;
 }

@@ -79,7 +79,7 @@ class UdpFanOut {
 /// Those of a lookup of the part of the path that one owner has.
 bench::Sizes sizes_of_segment() {
   return bench::sizes_of({1, chain(1), tfdude::LookupRequest{{{chain(1), chain(3)}}}}, "p1",
-                         {1, 0, tfdude::SegmentValues{{tfdude::Transform()}, {}, {}, {}}});
+                         {1, 0, tfdude::SegmentValues{{{tfdude::Transform()}}, {}, {}, {}}});
 }
 
 void compare_partitions(const Arguments& arguments) {

@@ -28,14 +28,12 @@ bool all_of(const std::vector<SegmentValues>& answers, Time instant) {
 // Whether each answer has values at the hint; if so, these become the answers.
 bool take_hint(std::vector<SegmentValues>& answers, Time hint) {
   const bool all = std::all_of(answers.begin(), answers.end(), [&](const SegmentValues& answer) {
-    return !answer.stamp || *answer.stamp == hint || !answer.at_hint.empty();
+    return !answer.stamp || *answer.stamp == hint || !answer.at_hint.values.empty();
   });
   if (!all) return false;
   for (SegmentValues& answer : answers) {
     if (!answer.stamp || *answer.stamp == hint) continue;
-    answer.values = std::move(answer.at_hint);
-    answer.correlations = std::move(answer.correlations_at_hint);
-    answer.unspecified = std::move(answer.unspecified_at_hint);
+    static_cast<ValuesAtInstant&>(answer) = std::move(answer.at_hint);
     answer.stamp = hint;
   }
   return true;

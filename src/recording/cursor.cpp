@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "types/ros_tf.hpp"
+
 namespace tfdude::recording {
 namespace {
 
@@ -48,7 +50,7 @@ void Cursor::find_topics() {
     const Schema* schema = reader_.schema(channel.schema);
     if (schema == nullptr || channel.encoding != "cdr") continue;
     if (foreign_) {
-      if (schema->name != kTfType) continue;
+      if (schema->name != ros::kTfType) continue;
       topics_[id] = ends_with(channel.topic, "tf_static") ? Topic::kTfStatic : Topic::kTf;
       continue;
     }

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "recording/bytes.hpp"
+#include "base/bytes.hpp"
 #include "recording/crc32.hpp"
 #include "recording/mcap_reader.hpp"
 

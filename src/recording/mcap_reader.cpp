@@ -4,7 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
-#include "recording/bytes.hpp"
+#include "base/bytes.hpp"
 #include "recording/crc32.hpp"
 #include "recording/zstd.hpp"
 

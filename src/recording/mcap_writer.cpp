@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "recording/bytes.hpp"
+#include "base/bytes.hpp"
 #include "recording/crc32.hpp"
 
 namespace tfdude::recording {

@@ -12,7 +12,7 @@
 #include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/partition_news.hpp"
 
-#include "recording/cdr.hpp"
+#include "base/cdr.hpp"
 
 // The messages of a recording: to bytes, and from bytes of unknown origin.
 namespace tfdude::recording {
@@ -94,23 +94,6 @@ void encode_keyframe(bool ends, std::string& out);
 [[nodiscard]] Result<RecordedJoints> decode_joints(std::string_view message);
 [[nodiscard]] Result<Change> decode_event(std::string_view message);
 [[nodiscard]] Result<bool> decode_keyframe(std::string_view message);
-
-/// Transforms as ROS has them.
-class TfEncoder {
- public:
-  explicit TfEncoder(std::string& out);
-  void add(const WatchedFrame& edge, const Pose& X_PC, Time stamp);
-  [[nodiscard]] std::uint32_t count() const { return count_; }
-  void finish() {
-    writer_.set(count_place_, count_);
-    writer_.finish();
-  }
-
- private:
-  CdrWriter writer_;
-  std::size_t count_place_;
-  std::uint32_t count_ = 0;
-};
 
 /// The transforms of a TFMessage.
 struct RecordedTransforms {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "recording/messages.hpp"
+#include "types/ros_tf.hpp"
 
 namespace tfdude::recording {
 namespace {
@@ -112,11 +113,12 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
 }
 
 Result<void> Recorder::write_tf(const Known& known, const ValuesNews& news, Time now) {
-  TfEncoder encoder(message_);
+  ros::TfEncoder encoder(message_);
   std::optional<Time> publish;
   for (const WatchedValue& value : news.values) {
     if (!value.stamp || value.frame >= known.frames.size()) continue;
-    encoder.add(known.frames[value.frame], value.X_PC.pose, *value.stamp);
+    const WatchedFrame& edge = known.frames[value.frame];
+    encoder.add(edge.parent, edge.id, value.X_PC.pose, *value.stamp);
     publish = std::max(publish, value.stamp);
   }
   if (encoder.count() == 0) return {};
@@ -126,11 +128,12 @@ Result<void> Recorder::write_tf(const Known& known, const ValuesNews& news, Time
 
 Result<void> Recorder::write_statics(Time now) {
   if (!std::exchange(statics_changed_, false)) return {};
-  TfEncoder encoder(message_);
+  ros::TfEncoder encoder(message_);
   for (const auto& [name, known] : partitions_) {
     for (std::size_t i = 0; i < known.edges.size(); ++i) {
       const auto& value = known.edges[i].newest;
-      if (value && is_static(*value)) encoder.add(known.frames[i], value->X_PC.pose, now);
+      if (!value || !is_static(*value)) continue;
+      encoder.add(known.frames[i].parent, known.frames[i].id, value->X_PC.pose, now);
     }
   }
   encoder.finish();

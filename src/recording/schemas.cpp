@@ -1,38 +1,9 @@
 #include "recording/schemas.hpp"
 
+#include "types/ros_tf.hpp"
+
 namespace tfdude::recording {
 namespace {
-
-constexpr std::string_view kTfDefinition = R"(geometry_msgs/TransformStamped[] transforms
-================================================================================
-MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-Transform transform
-================================================================================
-MSG: geometry_msgs/Transform
-Vector3 translation
-Quaternion rotation
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x 0
-float64 y 0
-float64 z 0
-float64 w 1
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-)";
 
 constexpr std::string_view kKeyframeDefinition =
     R"(# All that is known follows once more: messages with `repeats`, up to the one that says so.
@@ -148,8 +119,8 @@ constexpr std::string_view kStaticQos = R"(- history: 1
 
 const std::array<TopicType, 7>& topic_types() {
   static const std::array<TopicType, 7> kTypes{{
-      {Topic::kTf, "/tf", kTfType, kTfDefinition, ""},
-      {Topic::kTfStatic, "/tf_static", kTfType, kTfDefinition, kStaticQos},
+      {Topic::kTf, "/tf", ros::kTfType, ros::kTfDefinition, ""},
+      {Topic::kTfStatic, "/tf_static", ros::kTfType, ros::kTfDefinition, kStaticQos},
       {Topic::kKeyframe, "/tfdude/keyframe", "tfdude_msgs/msg/Keyframe", kKeyframeDefinition, ""},
       {Topic::kFrames, "/tfdude/frames", "tfdude_msgs/msg/Frames", kFramesDefinition, ""},
       {Topic::kValues, "/tfdude/values", "tfdude_msgs/msg/Values", kValuesDefinition, ""},

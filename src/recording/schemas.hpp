@@ -17,8 +17,6 @@ struct TopicType {
   std::string_view qos;  ///< for players of ROS 2; empty: the default
 };
 
-inline constexpr std::string_view kTfType = "tf2_msgs/msg/TFMessage";
-
 /// In the order of Topic.
 [[nodiscard]] const std::array<TopicType, 7>& topic_types();
 

@@ -21,20 +21,6 @@ Result<void> check_edge(const WatchedFrame& edge) {
 
 }  // namespace
 
-TfEncoder::TfEncoder(std::string& out) : writer_(out), count_place_(writer_.later()) {}
-
-void TfEncoder::add(const WatchedFrame& edge, const Pose& X_PC, Time stamp) {
-  ++count_;
-  const std::int64_t ns = nanoseconds(stamp);
-  writer_.u32(static_cast<std::uint32_t>(ns / kSecond));
-  writer_.u32(static_cast<std::uint32_t>(ns % kSecond));
-  writer_.text(edge.parent);
-  writer_.text(edge.id);
-  for (int i = 0; i < 3; ++i) writer_.f64(X_PC.translation()[i]);
-  const Eigen::Quaterniond& q = X_PC.rotation();
-  for (const double number : {q.x(), q.y(), q.z(), q.w()}) writer_.f64(number);
-}
-
 Result<RecordedTransforms> decode_tf(std::string_view message) {
   CdrReader reader(message);
   const std::uint32_t count = reader.count(kLeastTransform);

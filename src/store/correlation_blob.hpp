@@ -8,7 +8,7 @@
 
 namespace tfdude {
 
-/// Serializes a correlation for storage, in the machine's byte order:
+/// Serializes a correlation for storage; all numbers are little-endian:
 /// - whether it is unknown (1 byte);
 /// - the number of common errors (4 bytes), and for each its source, whether it subtracts (1), the
 ///   number of columns (4), and the loading column by column;

@@ -252,11 +252,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   if (edges) tell_observed_with(*ends, *found);
   if (hint && found->stamp && hint != found->stamp) {
     auto at_hint = segments_at(*ends, {nanoseconds(*hint), true}, query);
-    if (at_hint) {
-      found->at_hint = std::move(at_hint->values);
-      found->correlations_at_hint = std::move(at_hint->correlations);
-      found->unspecified_at_hint = std::move(at_hint->unspecified);
-    }
+    if (at_hint) found->at_hint = static_cast<ValuesAtInstant&&>(*at_hint);
   }
   return found;
 }

@@ -38,21 +38,22 @@ struct UnspecifiedEdge {
   std::string id;
 };
 
-/// The values of one owner's part of a path: all from one commit and for one instant.
-struct SegmentValues {
+/// The values of some segments at one instant.
+struct ValuesAtInstant {
   std::vector<Transform> values;  ///< one per segment
-  std::optional<Time> stamp;
-  /// Time between the two newest samples of the edge whose newest sample is the oldest.
-  std::chrono::nanoseconds period{0};
-  /// `values` at the other instant; empty if they are not available.
-  std::vector<Transform> at_hint;
   /// One per segment, whose covariance is then that of the own part; empty if no edge is
   /// correlated.
   std::vector<PathCorrelation> correlations{};
-  std::vector<PathCorrelation> correlations_at_hint{};
   /// Of the segments whose covariance is not complete, in the order of the path.
   std::vector<UnspecifiedEdge> unspecified{};
-  std::vector<UnspecifiedEdge> unspecified_at_hint{};
+};
+
+/// The values of one owner's part of a path: all from one commit and for one instant.
+struct SegmentValues : ValuesAtInstant {
+  std::optional<Time> stamp;
+  /// Time between the two newest samples of the edge whose newest sample is the oldest.
+  std::chrono::nanoseconds period{0};
+  ValuesAtInstant at_hint{};      ///< at the other instant; empty if they are not available
   std::uint64_t commit = 0;       ///< the commit of the values; see revise()
   std::uint64_t history = 0;      ///< the newest history of their edges; see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition

@@ -15,10 +15,10 @@ void strip(wire::Joints&, std::vector<fastdds::Numbers>&) {}
 
 void demand_same_names(const Bytes& bytes, const wire::Joints& sample) {
   auto joint = sample.positions().begin();
-  const bool differs = fastdds::any_joint(bytes.data(), bytes.size(), [&](std::string_view name) {
+  const auto differs = fastdds::any_joint(bytes.data(), bytes.size(), [&](std::string_view name) {
     return joint == sample.positions().end() || name != (joint++)->id().c_str();
   });
-  demand(!differs && joint == sample.positions().end(), "names are read as the whole is");
+  demand(differs == false && joint == sample.positions().end(), "names are read as the whole is");
 }
 
 /// An arm whose elbow a hand follows.

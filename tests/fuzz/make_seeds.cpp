@@ -18,6 +18,7 @@
 #include "store/sqlite_store.hpp"
 #include "support/samples.hpp"
 #include "tfdude-ros/fastdds/convert.hpp"
+#include "types/ros_tf.hpp"
 
 namespace tfdude::fuzz {
 namespace {
@@ -169,8 +170,8 @@ void write_messages(const std::filesystem::path& folder) {
   write(folder / "recording", "messages", ours);
   Bytes ros{1};
   for (const Topic topic : {Topic::kTf, Topic::kTfStatic}) {
-    TfEncoder encoder(message);
-    encoder.add({topic == Topic::kTf ? "base" : "camera", "odom"}, random.pose(), time_of(5));
+    ros::TfEncoder encoder(message);
+    encoder.add("odom", topic == Topic::kTf ? "base" : "camera", random.pose(), time_of(5));
     encoder.finish();
     add(ros, topic);
   }

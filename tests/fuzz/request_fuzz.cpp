@@ -54,9 +54,9 @@ void run(const Bytes& bytes) {
   const bool well_formed = fastdds::well_formed_request(bytes.data(), bytes.size());
   const auto sample = received<fastdds::RequestType, wire::Request>(bytes, well_formed);
   if (!sample) return;
-  fastdds::RequestHead head;
-  demand(fastdds::read_request_head(bytes.data(), bytes.size(), head), "a request has a head");
-  demand(head.id == sample->id().c_str() && head.addressee == sample->addressee(),
+  const auto head = fastdds::read_request_head(bytes.data(), bytes.size());
+  demand(head.has_value(), "a request has a head");
+  demand(head->id == sample->id().c_str() && head->addressee == sample->addressee(),
          "the head is read as the whole is");
   const auto request = round_trip<fastdds::RequestType>(
       *sample, [](const Request& message) { return fastdds::to_wire(message, "robot"); },

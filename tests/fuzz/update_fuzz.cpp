@@ -14,10 +14,10 @@ void strip(wire::Update& sample, std::vector<fastdds::Numbers>& out) {
 
 void demand_same_ids(const Bytes& bytes, const wire::Update& sample) {
   auto edge = sample.edges().begin();
-  const bool differs = fastdds::any_edge(bytes.data(), bytes.size(), [&](std::string_view id) {
+  const auto differs = fastdds::any_edge(bytes.data(), bytes.size(), [&](std::string_view id) {
     return edge == sample.edges().end() || id != (edge++)->id().c_str();
   });
-  demand(!differs && edge == sample.edges().end(), "ids are read as the whole is");
+  demand(differs == false && edge == sample.edges().end(), "ids are read as the whole is");
 }
 
 void run(const Bytes& bytes) {

@@ -9,7 +9,7 @@
 
 #include "fuzz/demand.hpp"
 #include "support/samples.hpp"
-#include "transport/fastdds/codec_values.hpp"
+#include "transport/fastdds/field_values.hpp"
 
 // Shared by all harnesses of DDS samples: reads the bytes as a reader does, up to the message.
 namespace tfdude::fuzz {

@@ -156,10 +156,10 @@ bool take(const Bytes& bytes) {
   found.values = {random.transform(), random.transform()};
   found.stamp = time_of(5);
   found.period = std::chrono::nanoseconds(6);
-  found.at_hint = {random.transform(), random.transform()};
+  found.at_hint.values = {random.transform(), random.transform()};
   const Correlation some = correlation(random);
   found.correlations = {{}, {random.covariance(), some.common_errors, some.observed_with}};
-  found.correlations_at_hint = {{random.covariance(), {}, {}}, {}};
+  found.at_hint.correlations = {{random.covariance(), {}, {}}, {}};
   found.commit = 77;
   found.incarnation = 78;
   return found;
@@ -171,12 +171,12 @@ bool take(const Bytes& bytes) {
     found = correlated_values(random);
   } else {
     found.values = {random.transform(), random.transform()};
-    found.at_hint = {random.transform(), random.transform()};
+    found.at_hint.values = {random.transform(), random.transform()};
   }
   found.unspecified = {{1, "hand"}, {1, std::string(255, 'u')}};
   found.values[1].covariance.set_complete(false);
-  found.unspecified_at_hint = {{0, "arm"}, {1, "hand"}};
-  for (Transform& X : found.at_hint) X.covariance.set_complete(false);
+  found.at_hint.unspecified = {{0, "arm"}, {1, "hand"}};
+  for (Transform& X : found.at_hint.values) X.covariance.set_complete(false);
   return found;
 }
 
@@ -224,12 +224,12 @@ bool take(const Bytes& bytes) {
       {3, 0, Error{Errc::kTransport, ""}},
       {4, 30, SegmentValues{}},
       {5, 40,
-       SegmentValues{{random.transform(), Transform::exact({}), random.transform()}, {}, {}, {}}},
+       SegmentValues{{{random.transform(), Transform::exact({}), random.transform()}}, {}, {}, {}}},
       {6, 40,
-       SegmentValues{{random.transform()},
+       SegmentValues{{{random.transform()}},
                      time_of(1'700'000'000'000'000'001),
                      std::chrono::nanoseconds(5),
-                     {random.transform()}}},
+                     {{random.transform()}}}},
       {7, 1, PushedValues{1, {}}},
       {8, 1,
        PushedValues{

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "support/cdr.hpp"
-#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
 
 // Whether samples that are built by hand are well formed, by topic.
 namespace tfdude::testing::well_formed {

@@ -2,12 +2,10 @@
 
 #include <atomic>
 
-#include "transport/fastdds/cdr_check.hpp"
+#include "base/cdr.hpp"
 
 namespace tfdude::ros {
 namespace {
-
-using fastdds::detail::CdrWalk;
 
 // A longer sample would not fit into the memory that a message may take anyway.
 constexpr std::uint32_t kMost = 1U << 26U;
@@ -17,19 +15,19 @@ std::atomic<std::uint64_t>& malformed() {
   return count;
 }
 
-bool counted(const CdrWalk& walk) {
-  if (!walk.good()) malformed().fetch_add(1, std::memory_order_relaxed);
-  return walk.good();
+bool counted(const CdrReader& in) {
+  if (!in.good()) malformed().fetch_add(1, std::memory_order_relaxed);
+  return in.good();
 }
 
-void time(CdrWalk& walk) { walk.skip(8, 4); }
+void time(CdrReader& in) { in.skip(8, 4); }
 
-void header(CdrWalk& walk) {
-  time(walk);
-  walk.string(kMost);
+void header(CdrReader& in) {
+  time(in);
+  in.bounded_text(kMost);
 }
 
-void doubles(CdrWalk& walk, std::size_t count) { walk.skip(count * sizeof(double), 8); }
+void doubles(CdrReader& in, std::size_t count) { in.skip(count * sizeof(double), 8); }
 
 constexpr std::size_t kPose = 7;
 constexpr std::size_t kTwist = 6;
@@ -38,50 +36,48 @@ constexpr std::size_t kCovariance = 36;
 }  // namespace
 
 bool well_formed_tf(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  walk.sequence(
-      [&] {
-        header(walk);
-        walk.string(kMost);
-        doubles(walk, kPose);
-      },
-      kMost);
-  return counted(walk);
+  CdrReader in(data, size);
+  in.sequence(kMost, [&] {
+    header(in);
+    in.bounded_text(kMost);
+    doubles(in, kPose);
+  });
+  return counted(in);
 }
 
 bool well_formed_joint_state(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  header(walk);
-  walk.sequence([&] { walk.string(kMost); }, kMost);
-  for (int i = 0; i < 3; ++i) walk.numbers(kMost);  // positions, velocities, efforts
-  return counted(walk);
+  CdrReader in(data, size);
+  header(in);
+  in.sequence(kMost, [&] { in.bounded_text(kMost); });
+  for (int i = 0; i < 3; ++i) in.numbers(kMost);  // positions, velocities, efforts
+  return counted(in);
 }
 
 bool well_formed_string(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  walk.string(kMost);
-  return counted(walk);
+  CdrReader in(data, size);
+  in.bounded_text(kMost);
+  return counted(in);
 }
 
 bool well_formed_pose(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  header(walk);
-  doubles(walk, kPose + kCovariance);
-  return counted(walk);
+  CdrReader in(data, size);
+  header(in);
+  doubles(in, kPose + kCovariance);
+  return counted(in);
 }
 
 bool well_formed_odometry(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  header(walk);
-  walk.string(kMost);
-  doubles(walk, kPose + kCovariance + kTwist + kCovariance);
-  return counted(walk);
+  CdrReader in(data, size);
+  header(in);
+  in.bounded_text(kMost);
+  doubles(in, kPose + kCovariance + kTwist + kCovariance);
+  return counted(in);
 }
 
 bool well_formed_clock(const std::uint8_t* data, std::size_t size) {
-  CdrWalk walk(data, size);
-  time(walk);
-  return counted(walk);
+  CdrReader in(data, size);
+  time(in);
+  return counted(in);
 }
 
 std::uint64_t malformed_samples() { return malformed().load(std::memory_order_relaxed); }

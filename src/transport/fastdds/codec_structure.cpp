@@ -1,171 +1,89 @@
+#include <string>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "transport/fastdds/codec.hpp"
-#include "transport/fastdds/codec_correlation.hpp"
+#include "transport/fastdds/fields.hpp"
 
-// Converts the structure for the network, and from it.
+// Pages and presences.
 namespace tfdude::fastdds {
 namespace {
 
-Result<Tombstone> read_tombstone(const wire::Tombstone& sample) {
-  constexpr auto kLast = static_cast<std::uint8_t>(Tombstone::Kind::kDropped);
-  if (sample.kind() < 1 || sample.kind() > kLast) {
-    return fail(Errc::kInvalidInput,
-                "unknown kind " + std::to_string(sample.kind()) + " of a tombstone");
+// Of the partition that the message is about.
+struct Incarnation : Count64 {
+  template <class Message>
+  static void write(const Message& message, std::uint64_t& wire) {
+    wire = message.incarnation;
   }
-  Tombstone tombstone{string_of(sample.id()), sample.lamport_time(),
-                      static_cast<Tombstone::Kind>(sample.kind()), string_of(sample.rival())};
-  if (auto ok = check_id(tombstone.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-  if (!tombstone.rival.empty()) {
-    if (auto ok = check_partition_name(tombstone.rival); !ok) return tl::unexpected(ok.error());
+  template <class Message>
+  static Result<void> read(std::uint64_t wire, Message& message, const Place&) {
+    message.incarnation = wire;
+    if (wire != 0) return {};
+    return fail(Errc::kInvalidInput, "incarnation 0 of partition " + quote(message.partition));
   }
-  return tombstone;
-}
+};
 
-Result<void> check_incarnation(std::uint64_t incarnation, const std::string& partition) {
-  if (incarnation != 0) return {};
-  return fail(Errc::kInvalidInput, "incarnation 0 of partition " + quote(partition));
-}
+constexpr auto kEntry =
+    record(TFDUDE_FIELD(lamport_time, lamport_time, Count64()), TFDUDE_FIELD(id, id, Id("id")),
+           TFDUDE_FIELD(parent, parent, Id("parent", true)));
+
+constexpr auto kTombstone =
+    record(TFDUDE_FIELD(lamport_time, lamport_time, Count64()),
+           TFDUDE_FIELD(kind, kind, Enumerated(Tombstone::Kind::kDropped, "a tombstone")),
+           TFDUDE_FIELD(id, id, Id("id")), TFDUDE_FIELD(rival, rival, PartitionName(true)));
+
+constexpr auto kPageEpoch =
+    record(TFDUDE_FIELD(epoch, epoch, Count64()), TFDUDE_FIELD(number, number, Count32()));
+
+constexpr auto kPageJoint = record(TFDUDE_FIELD(name, name, Id("joint")),
+                                   TFDUDE_FIELD(follows, follows, Id("joint", true)));
+
+constexpr auto kPage = record(
+    TFDUDE_FIELD(partition, partition, PartitionName()), TFDUDE_FIELD(number, number, Count32()),
+    TFDUDE_FIELD_OF_ALL(incarnation, Incarnation()), TFDUDE_FIELD(epoch, epoch, Count64()),
+    TFDUDE_FIELD(entries, entries, List(kEntry)),
+    TFDUDE_FIELD(tombstones, tombstones, List(kTombstone)),
+    TFDUDE_FIELD(others, others, List(kPageEpoch)), TFDUDE_FIELD(joints, joints, List(kPageJoint)));
+
+constexpr auto kAbsent =
+    record(TFDUDE_FIELD(since, since, Number<std::int64_t>()),
+           TFDUDE_FIELD(incarnation, incarnation, Count64()),
+           TFDUDE_FIELD(kind, kind, Enumerated(Absent::Kind::kForgotten, "an absence")),
+           TFDUDE_FIELD(partition, partition, PartitionName()));
+
+constexpr auto kPresence = record(
+    TFDUDE_FIELD(partition, partition, PartitionName()),
+    TFDUDE_FIELD_OF_ALL(incarnation, Incarnation()), TFDUDE_FIELD(host, host, Id("host")),
+    TFDUDE_FIELD(pid, pid, Count32()), TFDUDE_FIELD(pages, pages, Count32()),
+    TFDUDE_FIELD_OF_ALL(peers, NotOfMessage<std::uint32_t>()),
+    TFDUDE_FIELD(serving, serving, Boolean()), TFDUDE_FIELD(absent, absent, List(kAbsent)),
+    TFDUDE_FIELD(ticket, ticket, Count64()), TFDUDE_FIELD(taken, taken, Octet()),
+    TFDUDE_FIELD(stopped, stopped, Octet()),
+    TFDUDE_FIELD(major_version, protocol.major, Number<std::uint16_t>()),
+    TFDUDE_FIELD(minor_version, protocol.minor, Number<std::uint16_t>()),
+    TFDUDE_FIELD(program, program, Shown()), TFDUDE_FIELD(clock, clock, AtMostOne(Instant())));
 
 }  // namespace
 
-Result<Page> from_wire(const wire::Page& sample) {
-  Page page{string_of(sample.partition()),
-            sample.number(),
-            sample.incarnation(),
-            sample.epoch(),
-            {},
-            {},
-            {},
-            {}};
-  if (auto ok = check_partition_name(page.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  if (auto ok = check_incarnation(page.incarnation, page.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  page.entries.reserve(sample.entries().size());
-  for (const wire::PageEntry& entry : sample.entries()) {
-    PageEntry read{string_of(entry.id()), string_of(entry.parent()), entry.lamport_time()};
-    if (auto ok = check_id(read.id, "id"); !ok) return tl::unexpected(std::move(ok.error()));
-    if (!read.parent.empty()) {
-      if (auto ok = check_id(read.parent, "parent"); !ok)
-        return tl::unexpected(std::move(ok.error()));
-    }
-    page.entries.push_back(std::move(read));
-  }
-  page.tombstones.reserve(sample.tombstones().size());
-  for (const wire::Tombstone& tombstone : sample.tombstones()) {
-    auto read = read_tombstone(tombstone);
-    if (!read) return tl::unexpected(std::move(read.error()));
-    page.tombstones.push_back(*std::move(read));
-  }
-  for (const wire::PageEpoch& one : sample.others()) {
-    page.others.push_back({one.number(), one.epoch()});
-  }
-  for (const wire::PageJoint& one : sample.joints()) {
-    PageJoint joint{string_of(one.name()), string_of(one.follows())};
-    if (auto ok = check_id(joint.name, "joint"); !ok) return tl::unexpected(std::move(ok.error()));
-    if (auto ok = check_id(joint.follows, "joint"); !joint.follows.empty() && !ok) {
-      return tl::unexpected(std::move(ok.error()));
-    }
-    page.joints.push_back(std::move(joint));
-  }
-  return page;
+bool well_formed_page(const std::uint8_t* data, std::size_t size) {
+  return well_formed(kPage, data, size);
+}
+
+void write_wire(const Page& page, wire::Page& sample) { kPage.write(page, sample); }
+
+Result<Page> from_wire(const wire::Page& sample) { return read_as<Page>(kPage, sample, {}); }
+
+bool well_formed_presence(const std::uint8_t* data, std::size_t size) {
+  return well_formed(kPresence, data, size);
+}
+
+void write_wire(const Presence& presence, wire::Presence& sample) {
+  kPresence.write(presence, sample);
 }
 
 Result<Presence> from_wire(const wire::Presence& sample) {
-  Presence presence{string_of(sample.partition()),
-                    sample.incarnation(),
-                    std::string(sample.host().c_str()),
-                    sample.pid(),
-                    sample.pages(),
-                    sample.serving(),
-                    {},
-                    sample.taken() != 0,
-                    sample.stopped() != 0,
-                    sample.ticket(),
-                    {sample.major_version(), sample.minor_version()},
-                    printable(sample.program().c_str())};
-  if (auto ok = check_partition_name(presence.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  if (auto ok = check_incarnation(presence.incarnation, presence.partition); !ok) {
-    return tl::unexpected(std::move(ok.error()));
-  }
-  if (auto ok = check_id(presence.host, "host"); !ok) return tl::unexpected(std::move(ok.error()));
-  if (!sample.clock().empty()) presence.clock = time_of(sample.clock().front());
-  for (const wire::Absent& one : sample.absent()) {
-    const auto kind = static_cast<Absent::Kind>(one.kind());
-    if (kind < Absent::Kind::kSilent || kind > Absent::Kind::kForgotten) {
-      return fail(Errc::kInvalidInput,
-                  "unknown kind " + std::to_string(one.kind()) + " of an absence");
-    }
-    presence.absent.push_back({string_of(one.partition()), one.since(), kind, one.incarnation()});
-    if (auto ok = check_partition_name(presence.absent.back().partition); !ok) {
-      return tl::unexpected(std::move(ok.error()));
-    }
-  }
-  return presence;
-}
-
-wire::Page to_wire(const Page& page) {
-  wire::Page sample;
-  sample.partition(page.partition);
-  sample.number(page.number);
-  sample.incarnation(page.incarnation);
-  sample.epoch(page.epoch);
-  sample.entries().resize(page.entries.size());
-  for (std::size_t i = 0; i < page.entries.size(); ++i) {
-    sample.entries()[i].id(page.entries[i].id);
-    sample.entries()[i].parent(page.entries[i].parent);
-    sample.entries()[i].lamport_time(page.entries[i].lamport_time);
-  }
-  sample.tombstones().resize(page.tombstones.size());
-  for (std::size_t i = 0; i < page.tombstones.size(); ++i) {
-    sample.tombstones()[i].id(page.tombstones[i].id);
-    sample.tombstones()[i].lamport_time(page.tombstones[i].lamport_time);
-    sample.tombstones()[i].kind(static_cast<std::uint8_t>(page.tombstones[i].kind));
-    sample.tombstones()[i].rival(page.tombstones[i].rival);
-  }
-  sample.others().resize(page.others.size());
-  for (std::size_t i = 0; i < page.others.size(); ++i) {
-    sample.others()[i].number(page.others[i].number);
-    sample.others()[i].epoch(page.others[i].epoch);
-  }
-  sample.joints().resize(page.joints.size());
-  for (std::size_t i = 0; i < page.joints.size(); ++i) {
-    sample.joints()[i].name(page.joints[i].name);
-    sample.joints()[i].follows(page.joints[i].follows);
-  }
-  return sample;
-}
-
-wire::Presence to_wire(const Presence& presence) {
-  wire::Presence sample;
-  sample.partition(presence.partition);
-  sample.incarnation(presence.incarnation);
-  sample.host(presence.host);
-  sample.pid(presence.pid);
-  sample.pages(presence.pages);
-  sample.serving(presence.serving);
-  sample.absent().resize(presence.absent.size());
-  for (std::size_t i = 0; i < presence.absent.size(); ++i) {
-    sample.absent()[i].partition(presence.absent[i].partition);
-    sample.absent()[i].since(presence.absent[i].since);
-    sample.absent()[i].kind(static_cast<std::uint8_t>(presence.absent[i].kind));
-    sample.absent()[i].incarnation(presence.absent[i].incarnation);
-  }
-  sample.taken(presence.taken ? 1 : 0);
-  sample.stopped(presence.stopped ? 1 : 0);
-  sample.ticket(presence.ticket);
-  sample.major_version(presence.protocol.major);
-  sample.minor_version(presence.protocol.minor);
-  sample.program(presence.program);
-  if (presence.clock) sample.clock({nanoseconds(*presence.clock)});
-  return sample;
+  return read_as<Presence>(kPresence, sample, {});
 }
 
 }  // namespace tfdude::fastdds

@@ -64,6 +64,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -163,10 +164,16 @@ class ParticipantListener final : public edds::DomainParticipantListener {
 template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>
 class CheckedType final : public Generated {
  public:
-  CheckedType() { this->m_typeSize = kUsualSize; }
+  /// @param on_malformed  called for each payload that is rejected, by any thread
+  explicit CheckedType(std::function<void()> on_malformed = [] {})
+      : on_malformed_(std::move(on_malformed)) {
+    this->m_typeSize = kUsualSize;
+  }
 
   bool deserialize(ertps::SerializedPayload_t* payload, void* data) override {
-    return WellFormed(payload->data, payload->length) && Generated::deserialize(payload, data);
+    if (WellFormed(payload->data, payload->length)) return Generated::deserialize(payload, data);
+    on_malformed_();
+    return false;
   }
 
   bool getKey(void* data, ertps::InstanceHandle_t* handle, bool force_md5) override {
@@ -176,6 +183,7 @@ class CheckedType final : public Generated {
 
  private:
   static constexpr std::uint32_t kUsualSize = 512;
+  const std::function<void()> on_malformed_;
 };
 
 #else
@@ -258,10 +266,15 @@ class ParticipantListener final : public edds::DomainParticipantListener {
 template <class Generated, bool (*WellFormed)(const std::uint8_t*, std::size_t)>
 class CheckedType final : public Generated {
  public:
-  CheckedType() { this->max_serialized_type_size = kUsualSize; }
+  explicit CheckedType(std::function<void()> on_malformed = [] {})
+      : on_malformed_(std::move(on_malformed)) {
+    this->max_serialized_type_size = kUsualSize;
+  }
 
   bool deserialize(ertps::SerializedPayload_t& payload, void* data) override {
-    return WellFormed(payload.data, payload.length) && Generated::deserialize(payload, data);
+    if (WellFormed(payload.data, payload.length)) return Generated::deserialize(payload, data);
+    on_malformed_();
+    return false;
   }
 
   bool compute_key(ertps::SerializedPayload_t& payload, ertps::InstanceHandle_t& handle,
@@ -279,6 +292,7 @@ class CheckedType final : public Generated {
 
  private:
   static constexpr std::uint32_t kUsualSize = 512;
+  const std::function<void()> on_malformed_;
 };
 
 #endif

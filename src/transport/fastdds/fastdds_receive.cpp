@@ -5,7 +5,6 @@
 #include "base/log.hpp"
 #include "partition/requests.hpp"
 #include "transport/fastdds/fastdds_transport.hpp"
-#include "transport/fastdds/kinds.hpp"
 #include "transport/fastdds/topics.hpp"
 
 // What becomes of samples that arrive.

@@ -93,7 +93,7 @@ Result<void> FastDdsTransport::create_participant() {
   participant_ = *joined;
   discovery_gate_.open();
   self_ = peer_of(participant_->guid().guidPrefix);
-  return create_topics(*participant_, topics_);
+  return create_topics(*participant_, counters_, topics_);
 }
 
 // The profile's lease is used only to detect loss here; DDS itself keeps a match for longer (see

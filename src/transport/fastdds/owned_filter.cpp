@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/topics.hpp"
 
@@ -10,53 +10,34 @@ namespace tfdude::fastdds {
 
 OwnedFilters::OwnedFilters(const std::string& partition, const TransportHandler& handler,
                            FastDdsCounters& counters, FairShare& fair_share)
-    : view_{addressee_of(partition), handler, counters, fair_share} {}
+    : counters_(counters),
+      fair_share_(fair_share),
+      requests_(*this, kRequestTopic, counters.requests_arrived, counters.requests_passed,
+                [&handler, own = addressee_of(partition)](const std::uint8_t* data,
+                                                          std::size_t size) -> std::optional<bool> {
+                  const auto head = read_request_head(data, size);
+                  if (!head) return std::nullopt;
+                  return head->addressee == own || handler.owns(head->id);
+                }),
+      updates_(*this, kUpdateTopic, counters.updates_arrived, counters.updates_passed,
+               [&handler](const std::uint8_t* data, std::size_t size) {
+                 return any_edge(data, size, [&](std::string_view id) { return handler.owns(id); });
+               }),
+      joints_(*this, kJointTopic, counters.updates_arrived, counters.updates_passed,
+              [&handler](const std::uint8_t* data, std::size_t size) {
+                return any_joint(data, size,
+                                 [&](std::string_view name) { return handler.owns_joint(name); });
+              }) {}
 
-bool OwnedFilters::View::admits(const edds::IContentFilter::FilterSampleInfo& info) const {
-  return fair_share.admits(peer_of(info.sample_identity.writer_guid().guidPrefix),
-                           FairShare::Clock::now());
-}
-
-bool OwnedFilters::Requests::evaluate(const SerializedPayload& payload,
-                                      const FilterSampleInfo& info, const GUID_t&) const {
-  if (!view_.admits(info)) return false;
-  view_.counters.requests_arrived.fetch_add(1, std::memory_order_relaxed);
-  RequestHead head;
-  if (!read_request_head(payload.data, payload.length, head)) {
-    count_malformed(view_.counters, kRequestTopic);
-    return false;
-  }
-  const bool passes = head.addressee == view_.addressee || view_.handler.owns(head.id);
-  if (passes) view_.counters.requests_passed.fetch_add(1, std::memory_order_relaxed);
-  return passes;
-}
-
-bool OwnedFilters::Joints::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+bool OwnedFilters::Filter::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                     const GUID_t&) const {
-  if (!view_.admits(info)) return false;
-  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
-  if (!well_formed_joints(payload.data, payload.length)) {
-    count_malformed(view_.counters, kJointTopic);
-    return false;
-  }
-  const bool passes = any_joint(payload.data, payload.length, [this](std::string_view name) {
-    return view_.handler.owns_joint(name);
-  });
-  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
-  return passes;
-}
-
-bool OwnedFilters::Updates::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
-                                     const GUID_t&) const {
-  if (!view_.admits(info)) return false;
-  view_.counters.updates_arrived.fetch_add(1, std::memory_order_relaxed);
-  if (!well_formed_update(payload.data, payload.length)) {
-    count_malformed(view_.counters, kUpdateTopic);
-    return false;
-  }
-  const bool passes = any_edge(payload.data, payload.length,
-                               [this](std::string_view id) { return view_.handler.owns(id); });
-  if (passes) view_.counters.updates_passed.fetch_add(1, std::memory_order_relaxed);
+  const PeerId sender = peer_of(info.sample_identity.writer_guid().guidPrefix);
+  if (!all_.fair_share_.admits(sender, FairShare::Clock::now())) return false;
+  arrived_.fetch_add(1, std::memory_order_relaxed);
+  const auto concerned = concerns_(payload.data, payload.length);
+  if (!concerned) count_malformed(all_.counters_, topic_);
+  const bool passes = concerned.value_or(false);
+  if (passes) passed_.fetch_add(1, std::memory_order_relaxed);
   return passes;
 }
 

@@ -1,6 +1,11 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "tfdude/transport/fastdds.hpp"
 
@@ -16,10 +21,10 @@
 namespace tfdude::fastdds {
 
 /// The filters of a partition's readers. They pass messages about a frame or joint that the
-/// partition owns, and requests addressed to it by name. They drop messages that are not well
-/// formed, and those of senders that flood it. They are evaluated at the reader, on the bytes,
-/// against the current set of owned frames: the announced expression, the partition's name, never
-/// changes.
+/// partition owns, and requests addressed to it by name. They drop the messages of senders that
+/// flood it. They are evaluated at the reader, on the bytes, against the current set of owned
+/// frames: the announced expression, the partition's name, never changes. They read no more than
+/// they need: what passes is checked as a whole before it is deserialized (CheckedType).
 class OwnedFilters final : public edds::IContentFilterFactory {
  public:
   /// The name under which the class is registered and announced.
@@ -37,51 +42,35 @@ class OwnedFilters final : public edds::IContentFilterFactory {
                                    edds::IContentFilter* filter) override;
 
  private:
-  /// What all filters look at.
-  struct View {
-    std::uint32_t addressee;
-    const TransportHandler& handler;
-    FastDdsCounters& counters;
-    FairShare& fair_share;
-
-    /// Whether the sender has not taken too much time already.
-    [[nodiscard]] bool admits(const edds::IContentFilter::FilterSampleInfo& info) const;
-  };
-
-  class Requests final : public edds::IContentFilter {
+  class Filter final : public edds::IContentFilter {
    public:
-    explicit Requests(const View& view) : view_(view) {}
+    /// Whether a message concerns the partition; nothing: it is malformed.
+    using Concerns = std::function<std::optional<bool>(const std::uint8_t* data, std::size_t size)>;
+
+    Filter(OwnedFilters& all, const char* topic, std::atomic<std::uint64_t>& arrived,
+           std::atomic<std::uint64_t>& passed, Concerns concerns)
+        : all_(all),
+          topic_(topic),
+          arrived_(arrived),
+          passed_(passed),
+          concerns_(std::move(concerns)) {}
+
     [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
                                 const GUID_t& reader) const override;
 
    private:
-    const View& view_;
+    OwnedFilters& all_;
+    const char* const topic_;
+    std::atomic<std::uint64_t>& arrived_;
+    std::atomic<std::uint64_t>& passed_;
+    const Concerns concerns_;
   };
 
-  class Updates final : public edds::IContentFilter {
-   public:
-    explicit Updates(const View& view) : view_(view) {}
-    [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
-                                const GUID_t& reader) const override;
-
-   private:
-    const View& view_;
-  };
-
-  class Joints final : public edds::IContentFilter {
-   public:
-    explicit Joints(const View& view) : view_(view) {}
-    [[nodiscard]] bool evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
-                                const GUID_t& reader) const override;
-
-   private:
-    const View& view_;
-  };
-
-  const View view_;
-  Requests requests_{view_};
-  Updates updates_{view_};
-  Joints joints_{view_};
+  FastDdsCounters& counters_;
+  FairShare& fair_share_;
+  Filter requests_;
+  Filter updates_;
+  Filter joints_;
 };
 
 }  // namespace tfdude::fastdds

@@ -6,7 +6,6 @@
 #include "tfdude/base/id.hpp"
 
 #include "partition/requests.hpp"
-#include "transport/fastdds/cdr_check.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/stream_channel.hpp"
 

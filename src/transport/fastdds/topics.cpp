@@ -7,7 +7,17 @@
 
 namespace tfdude::fastdds {
 
-Result<void> create_topics(edds::DomainParticipant& participant, Topics& topics) {
+namespace {
+
+template <class Type>
+edds::TypeSupport counted(const std::shared_ptr<FastDdsCounters>& counters, const char* topic) {
+  return edds::TypeSupport(new Type([counters, topic] { count_malformed(*counters, topic); }));
+}
+
+}  // namespace
+
+Result<void> create_topics(edds::DomainParticipant& participant,
+                           const std::shared_ptr<FastDdsCounters>& counters, Topics& topics) {
   Result<void> outcome;
   const auto create = [&](const char* name, const edds::TypeSupport& type) -> edds::Topic* {
     if (!outcome) return nullptr;
@@ -18,15 +28,15 @@ Result<void> create_topics(edds::DomainParticipant& participant, Topics& topics)
     if (!topic) outcome = tl::unexpected(topic.error());
     return topic.value_or(nullptr);
   };
-  topics.presence = create(kPresenceTopic, edds::TypeSupport(new PresenceType));
-  topics.directory = create(kDirectoryTopic, edds::TypeSupport(new PageType));
-  topics.reply = create(kReplyTopic, edds::TypeSupport(new ReplyType));
-  topics.request = create(kRequestTopic, edds::TypeSupport(new RequestType));
-  topics.change = create(kChangeTopic, edds::TypeSupport(new RequestType));
-  topics.update = create(kUpdateTopic, edds::TypeSupport(new UpdateType));
-  topics.joint = create(kJointTopic, edds::TypeSupport(new JointsType));
-  topics.state = create(kStateTopic, edds::TypeSupport(new StateType));
-  topics.clock = create(kClockTopic, edds::TypeSupport(new ClockType));
+  topics.presence = create(kPresenceTopic, counted<PresenceType>(counters, kPresenceTopic));
+  topics.directory = create(kDirectoryTopic, counted<PageType>(counters, kDirectoryTopic));
+  topics.reply = create(kReplyTopic, counted<ReplyType>(counters, kReplyTopic));
+  topics.request = create(kRequestTopic, counted<RequestType>(counters, kRequestTopic));
+  topics.change = create(kChangeTopic, counted<RequestType>(counters, kChangeTopic));
+  topics.update = create(kUpdateTopic, counted<UpdateType>(counters, kUpdateTopic));
+  topics.joint = create(kJointTopic, counted<JointsType>(counters, kJointTopic));
+  topics.state = create(kStateTopic, counted<StateType>(counters, kStateTopic));
+  topics.clock = create(kClockTopic, counted<ClockType>(counters, kClockTopic));
   return outcome;
 }
 

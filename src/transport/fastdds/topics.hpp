@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
+
 #include "tfdude/transport/fastdds.hpp"
 
-#include "transport/fastdds/cdr_check.hpp"
+#include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "types/topic_names.hpp"
 
@@ -31,8 +33,11 @@ struct Topics {
   edds::Topic* presence = nullptr;
 };
 
-/// Registers their types and creates them. @return kTransport, naming one that could not be created
-[[nodiscard]] Result<void> create_topics(edds::DomainParticipant& participant, Topics& topics);
+/// Registers their types, which count what is malformed, and creates them.
+/// @return kTransport, naming one that could not be created
+[[nodiscard]] Result<void> create_topics(edds::DomainParticipant& participant,
+                                         const std::shared_ptr<FastDdsCounters>& counters,
+                                         Topics& topics);
 
 /// Counts a sample that was dropped as not well formed, and logs the 1st, 2nd, 4th, 8th...
 void count_malformed(FastDdsCounters& counters, const char* topic);

@@ -20,8 +20,8 @@ using Steady = LatestHints::Steady;
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
 SegmentValues answer(std::optional<Time> stamp, double x, std::optional<double> at_hint = {}) {
-  SegmentValues values{{along_x(x)}, stamp, 10ms, {}};
-  if (at_hint) values.at_hint.push_back(along_x(*at_hint));
+  SegmentValues values{{{along_x(x)}}, stamp, 10ms, {}};
+  if (at_hint) values.at_hint.values.push_back(along_x(*at_hint));
   return values;
 }
 
@@ -102,8 +102,8 @@ TEST_CASE("one round trip is enough if samples arrive at constant rates") {
     std::vector<SegmentValues> answers;
     for (const std::int64_t period : periods) {
       const std::int64_t newest = (now - delay) / period * period + period / 3;
-      SegmentValues values{{along_x(1)}, time_of(newest), std::chrono::nanoseconds(period), {}};
-      if (hint && nanoseconds(*hint) <= newest) values.at_hint.push_back(along_x(1));
+      SegmentValues values{{{along_x(1)}}, time_of(newest), std::chrono::nanoseconds(period), {}};
+      if (hint && nanoseconds(*hint) <= newest) values.at_hint.values.push_back(along_x(1));
       answers.push_back(std::move(values));
     }
     hints.note("a", "b", steady, answers);

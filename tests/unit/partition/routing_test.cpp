@@ -289,7 +289,7 @@ TEST_CASE("a lookup that cannot succeed is not sent") {
 }
 
 SegmentValues values(std::vector<Transform> transforms) {
-  return {std::move(transforms), std::nullopt, {}, {}};
+  return {{std::move(transforms)}, std::nullopt, {}, {}};
 }
 
 TEST_CASE("answers are assembled in the order of the path") {

@@ -6,7 +6,7 @@
 #include <unistd.h>
 #include <vector>
 
-#include "recording/bytes.hpp"
+#include "base/bytes.hpp"
 #include "recording/crc32.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/mcap_writer.hpp"

@@ -13,6 +13,7 @@
 #include "recording/mcap_writer.hpp"
 #include "recording/messages.hpp"
 #include "support/catch.hpp"
+#include "types/ros_tf.hpp"
 
 using namespace tfdude;
 using namespace tfdude::recording;
@@ -71,8 +72,8 @@ void record(RecordingWriter& writer, double until) {
 
 void append(std::string& out, const std::string& parent, const std::string& child, double x,
             double stamp, McapWriter& writer, std::uint16_t channel) {
-  TfEncoder encoder(out);
-  encoder.add({child, parent}, shifted(x).pose, at(stamp));
+  ros::TfEncoder encoder(out);
+  encoder.add(parent, child, shifted(x).pose, at(stamp));
   encoder.finish();
   REQUIRE(writer.write({channel, nanoseconds(at(stamp)), 0, out}));
 }

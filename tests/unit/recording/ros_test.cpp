@@ -5,7 +5,7 @@
 
 #include "tfdude/recording/recording.hpp"
 
-#include "recording/cdr.hpp"
+#include "base/cdr.hpp"
 #include "recording/mcap_writer.hpp"
 #include "support/catch.hpp"
 

@@ -10,7 +10,7 @@
 #include "support/catch.hpp"
 #include "support/same_messages.hpp"
 #include "support/samples.hpp"
-#include "transport/fastdds/codec_values.hpp"
+#include "transport/fastdds/field_values.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -80,11 +80,11 @@ TEST_CASE("replies are decoded as they were encoded") {
       CHECK(came.stamp == values->stamp);
       CHECK(came.period == values->period);
       check_same(came.values, values->values);
-      check_same(came.at_hint, values->at_hint);
+      check_same(came.at_hint.values, values->at_hint.values);
       check_same(came.correlations, values->correlations);
-      check_same(came.correlations_at_hint, values->correlations_at_hint);
+      check_same(came.at_hint.correlations, values->at_hint.correlations);
       check_same(came.unspecified, values->unspecified);
-      check_same(came.unspecified_at_hint, values->unspecified_at_hint);
+      check_same(came.at_hint.unspecified, values->at_hint.unspecified);
       CHECK(came.commit == values->commit);
     } else if (const auto* pushed = std::get_if<PushedValues>(&one.body)) {
       check_same(std::get<PushedValues>(arrived->body), *pushed);
@@ -319,7 +319,7 @@ TEST_CASE("invalid values of a transform are rejected by frame and field") {
                   bad.field);
     CHECK(from_wire(update, [](std::string_view id) { return id == "hand"; }));
     wire::Reply reply =
-        to_wire(Reply{1, 2, SegmentValues{std::vector<Transform>(2), std::nullopt, {}, {}}});
+        to_wire(Reply{1, 2, SegmentValues{{std::vector<Transform>(2)}, std::nullopt, {}, {}}});
     reply.body().transforms()[1] = x_pc;
     // What another has computed may be of any size, and semi-definite to its rounding only.
     const bool only_for_users = std::isfinite(bad.value) && bad.index > 3;

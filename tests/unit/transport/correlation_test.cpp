@@ -5,7 +5,7 @@
 
 #include "support/catch.hpp"
 #include "support/samples.hpp"
-#include "transport/fastdds/codec_values.hpp"
+#include "transport/fastdds/field_values.hpp"
 
 namespace tfdude::fastdds {
 namespace {

@@ -220,9 +220,9 @@ TEST_CASE("segments of others name their unspecified edges") {
   const auto hinted = pair.forest.lookup_segments({{"world", "d"}}, {}, at(100ms));
   REQUIRE(hinted);
   CHECK(hinted->unspecified.size() == 1);
-  REQUIRE(hinted->at_hint.size() == 1);
-  CHECK(hinted->at_hint[0].covariance.complete());
-  CHECK(hinted->unspecified_at_hint.empty());
+  REQUIRE(hinted->at_hint.values.size() == 1);
+  CHECK(hinted->at_hint.values[0].covariance.complete());
+  CHECK(hinted->at_hint.unspecified.empty());
 }
 
 TEST_CASE("values that are pushed to another forest stay unspecified there") {

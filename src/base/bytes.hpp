@@ -1,12 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <string_view>
 
-// Little-endian numbers in byte strings, as MCAP has them.
-namespace tfdude::recording {
+// Little-endian numbers in byte strings.
+namespace tfdude {
 
 template <class Number>
 void put_number(char* to, Number value) {
@@ -30,6 +31,11 @@ class ByteWriter {
   void u16(std::uint16_t value) { number(value); }
   void u32(std::uint32_t value) { number(value); }
   void u64(std::uint64_t value) { number(value); }
+  void f64(double value) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    u64(bits);
+  }
 
   /// Its length in 32 bits, then the bytes.
   void text(std::string_view value) {
@@ -68,6 +74,12 @@ class ByteReader {
   [[nodiscard]] std::uint16_t u16() { return number<std::uint16_t>(); }
   [[nodiscard]] std::uint32_t u32() { return number<std::uint32_t>(); }
   [[nodiscard]] std::uint64_t u64() { return number<std::uint64_t>(); }
+  [[nodiscard]] double f64() {
+    const std::uint64_t bits = u64();
+    double value = 0;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+  }
 
   [[nodiscard]] std::string_view text() { return bytes(u32()); }
 
@@ -87,4 +99,4 @@ class ByteReader {
   bool good_ = true;
 };
 
-}  // namespace tfdude::recording
+}  // namespace tfdude

@@ -1,0 +1,214 @@
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "partition/watching.hpp"
+#include "transport/fastdds/codec.hpp"
+#include "transport/fastdds/field_values.hpp"
+#include "transport/fastdds/fields.hpp"
+
+// Requests. The ids in a body are checked only where an error must name them: ids without a frame
+// are rejected as unknown, and new ids are checked where they are added.
+namespace tfdude::fastdds {
+namespace {
+
+// ---- changes
+
+constexpr auto kAdd =
+    record(TFDUDE_FIELD(parent, parent, Text()), TFDUDE_FIELD(x_pc, X_PC, GivenTransform()),
+           TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+
+constexpr auto kRemove = record(TFDUDE_FIELD(tops, tops, List(Text())),
+                                TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+
+// The id of the first edge is that of the request.
+struct FirstEdge : GivenTransform {
+  static void write(const std::vector<EdgeUpdate>& edges, Numbers& wire) {
+    GivenTransform::write(edges.front().X_PC, wire);
+  }
+  static Result<void> read(const Numbers& wire, std::vector<EdgeUpdate>& edges,
+                           const Place& place) {
+    edges.assign(1, {std::string(place.frame.value_or("")), {}});
+    return GivenTransform::read(wire, edges.front().X_PC, place);
+  }
+};
+
+constexpr auto kUpdate =
+    record(TFDUDE_FIELD(x_pc, edges, FirstEdge()), TFDUDE_FIELD(stamp, stamp, Stamp("a stamp")),
+           TFDUDE_FIELD(more, edges, List(GivenEdge(), kMaxItems, 1)));
+
+constexpr auto kPartialEdge =
+    record(TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELDS(X_PC, PartialNumbers()));
+
+constexpr auto kPartialUpdate =
+    Ruled(record(TFDUDE_FIELD(stamp, stamp, Stamp("a stamp")),
+                 TFDUDE_FIELD(edges, edges, List(kPartialEdge))),
+          at_least_one(&PartialUpdateRequest::edges, "an update without edges"));
+
+constexpr auto kMove = record(TFDUDE_FIELD(parent, parent, Text()),
+                              TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+
+constexpr auto kMoveAndUpdate =
+    record(TFDUDE_FIELD(parent, parent, Text()), TFDUDE_FIELDS(X_PC, PartialNumbers()),
+           TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+
+bool only_moves(const MoveRequest& move) { return move.X_PC.empty(); }
+
+constexpr auto kJoints =
+    Ruled(JointSamples(), at_least_one(&JointUpdate::joints, "an update without joints"));
+
+constexpr auto kCorrelate = record(TFDUDE_FIELDS(correlation, AnyCorrelation()));
+
+constexpr auto kForget = record(TFDUDE_FIELD(incarnation, incarnation, Count64()),
+                                TFDUDE_FIELD(partition, partition, Text()));
+
+// ---- observations
+
+// Whether an edge has a new value, and that value.
+struct Revised {
+  static void check(CdrReader& in) {
+    Octet::check(in);
+    GivenTransform::check(in);
+    AnyCorrelation::check(in);
+  }
+  static void write(const ReviseRequest::Edge& edge, wire::RevisedEdge& wire) {
+    wire.revised(edge.revision ? 1 : 0);
+    wire.x_pc().clear();
+    if (edge.revision) GivenTransform::write(edge.revision->X_PC, wire.x_pc());
+    AnyCorrelation::write(edge.revision ? edge.revision->correlation : Correlation(),
+                          wire.edge_correlation());
+  }
+  static Result<void> read(const wire::RevisedEdge& wire, ReviseRequest::Edge& edge,
+                           const Place& place) {
+    if (wire.revised() == 0) return {};
+    Revision& revision = edge.revision.emplace();
+    revision.id = edge.id;
+    if (auto ok = ComputedTransform::read(wire.x_pc(), revision.X_PC, place); !ok) return ok;
+    return AnyCorrelation::read(wire.edge_correlation(), revision.correlation, place);
+  }
+};
+
+// Of the edge of an observation, whose id is not checked.
+struct RevisedId : Text {
+  static Result<void> read(const wire::Identifier& wire, ReviseRequest::Edge& edge, Place& place) {
+    place.frame = text(wire);
+    const NormalizedInnovation& innovation = edge.innovation;
+    if (!std::isfinite(innovation.squares + innovation.expected + innovation.variance)) {
+      return place.fail(
+          {Errc::kInvalidInput, "its normalized innovation is not a finite number, or too large"});
+    }
+    return Text::read(wire, edge.id, place);
+  }
+  static void write(const ReviseRequest::Edge& edge, wire::Identifier& wire) { wire = edge.id; }
+};
+
+constexpr auto kRevisedEdge = record(
+    TFDUDE_FIELD(squares, innovation.squares, Real()),
+    TFDUDE_FIELD(expected, innovation.expected, Real()),
+    TFDUDE_FIELD(variance, innovation.variance, Real()), TFDUDE_FIELD_OF_ALL(id, RevisedId()),
+    TFDUDE_FIELD(refused, refused, Octet()), field(TFDUDE_ALL, TFDUDE_ALL, Revised()));
+
+constexpr auto kRevise = Ruled(
+    record(TFDUDE_FIELD(stamp, stamp, Stamp("the stamp of an observation")),
+           TFDUDE_FIELD(seen, seen, Count64()), TFDUDE_FIELD(incarnation, incarnation, Count64()),
+           TFDUDE_FIELD(edges, edges, List(kRevisedEdge, kMaxCorrelated))),
+    at_least_one(&ReviseRequest::edges, "an observation without edges"));
+
+// ---- questions
+
+constexpr auto kSegments =
+    List(record(TFDUDE_FIELD(from, from, Text()), TFDUDE_FIELD(to, to, Text())));
+
+bool is_plain(const LookupRequest& lookup) {
+  const Query& query = lookup.query;
+  return !query.at && !lookup.hint && !query.age_noise_until &&
+         query.extrapolate == std::chrono::nanoseconds(0) && query.order == Order::kSecond &&
+         !lookup.edges;
+}
+
+constexpr auto kLookup = record(TFDUDE_FIELDS(segments, kSegments));
+
+struct OrderNumber : Octet {
+  static Result<void> read(std::uint8_t wire, Order& order, const Place& place) {
+    if (wire == 2 || wire == 4) return Octet::read(wire, order, place);
+    return fail(Errc::kInvalidInput,
+                "the order of a lookup is 2 or 4, not " + std::to_string(wire));
+  }
+};
+
+constexpr auto kLookupAt = record(
+    TFDUDE_FIELD(at, query.at, Stamp("the instant of a lookup")),
+    TFDUDE_FIELD(hint, hint, Stamp("the hint of a lookup")),
+    TFDUDE_FIELD(extrapolate, query.extrapolate, Duration("an extrapolation")),
+    TFDUDE_FIELD(age_noise_until, query.age_noise_until, Stamp("the end of a lookup's noise")),
+    TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(order, query.order, OrderNumber()),
+    TFDUDE_FIELD(edges, edges, Octet()));
+
+constexpr auto kWatch = Ruled(
+    record(TFDUDE_FIELD(period, period, Duration("the period of a watch")),
+           TFDUDE_FIELD(from, from, Stamp("the instant of a watch")),
+           TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(composed, composed, Octet())),
+    &check_watch);
+
+constexpr auto kOfAll = record(TFDUDE_FIELDS(all, Octet()));
+
+constexpr auto kJointStates = record(TFDUDE_FIELDS(after, Text()));
+
+constexpr auto kFrames =
+    record(TFDUDE_FIELD(ids, ids, List(Id("id"))), TFDUDE_FIELD(trees, trees, List(Id("tree"))),
+           TFDUDE_FIELD(seen, seen,
+                        List(record(TFDUDE_FIELD(epoch, epoch, Count64()),
+                                    TFDUDE_FIELD(partition, partition, PartitionName())))));
+
+constexpr auto kDescription = record(TFDUDE_FIELDS(from, Count64()));
+
+// ---- all of them
+
+constexpr auto kBody = cases(
+    "request", TFDUDE_CASE(1, AddRequest, add, kAdd),
+    TFDUDE_CASE(2, RemoveRequest, remove, kRemove), TFDUDE_CASE(3, UpdateRequest, update, kUpdate),
+    TFDUDE_CASE_IF(4, MoveRequest, move, kMove, &only_moves),
+    TFDUDE_CASE(5, MoveRequest, move_and_update, kMoveAndUpdate),
+    TFDUDE_CASE_IF(6, LookupRequest, lookup, kLookup, &is_plain),
+    TFDUDE_CASE(7, LookupRequest, lookup_at, kLookupAt),
+    TFDUDE_CASE(8, WatchRequest, watch, kWatch), TFDUDE_CASE(9, HistoryRequest, history, kOfAll),
+    TFDUDE_CASE(10, ReviseRequest, revise, kRevise),
+    TFDUDE_CASE(11, ConsistencyRequest, consistency, kOfAll),
+    TFDUDE_CASE(12, JointUpdate, joint_update, kJoints),
+    TFDUDE_CASE(13, JointsRequest, joint_states, kJointStates),
+    TFDUDE_CASE(14, CorrelateRequest, correlate, kCorrelate),
+    TFDUDE_CASE(15, PartialUpdateRequest, partial_update, kPartialUpdate),
+    TFDUDE_CASE(16, ForgetRequest, forget, kForget), SignOfLife<kProbe>(),
+    TFDUDE_CASE(18, FramesRequest, structure, kFrames),
+    TFDUDE_CASE(19, DescriptionRequest, description, kDescription));
+
+constexpr auto kRequest = record(
+    TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),
+    TFDUDE_FIELD(sequence_number, sequence, Count32()),
+    TFDUDE_FIELD(awaits_from, awaits_from, Count64()), TFDUDE_FIELD(body, body, kBody));
+
+}  // namespace
+
+bool well_formed_request(const std::uint8_t* data, std::size_t size) {
+  return well_formed(kRequest, data, size);
+}
+
+std::optional<RequestHead> read_request_head(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  RequestHead head{in.bounded_text(kMaxIdBytes), 0};
+  head.addressee = in.u32();
+  return in.good() ? std::optional(head) : std::nullopt;
+}
+
+void write_wire(const Request& request, std::string_view partition, wire::Request& sample) {
+  kRequest.write(request, sample);
+  sample.addressee(addressee_of(partition));
+}
+
+Result<Request> from_wire(const wire::Request& sample) {
+  return read_as<Request>(kRequest, sample, {});
+}
+
+}  // namespace tfdude::fastdds
