@@ -1,10 +1,14 @@
-# Tests of the project itself rather than of its code: the layers, the IDL, the installed package and the README.
+# Tests of the project itself rather than of its code: the layers, the words, the IDL, the installed package and the
+# README.
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 add_test(NAME "layers: sources" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py)
 add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
-set_tests_properties("layers: sources" "layers: the check itself" PROPERTIES LABELS unit TIMEOUT 60)
+add_test(NAME "words: prose and identifiers"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/scripts/check_words.py)
+set_tests_properties("layers: sources" "layers: the check itself" "words: prose and identifiers"
+  PROPERTIES LABELS unit TIMEOUT 60)
 
 # Checks that another vendor's compiler accepts the IDL; to it, names that differ only in case are the same name. It
 # warns if a type does not declare its extensibility.

@@ -7,7 +7,6 @@ with its underscores or parentheses, and is not found.
 import io
 import pathlib
 import re
-import subprocess
 import sys
 import tokenize
 
@@ -30,7 +29,7 @@ SUBJECTLESS = r"^(Who|Whoever|It)\b"
 IDENTIFIERS = {
     "told_of": "note_update, note_announced_epoch", "told_all": "replace_reports", "unhang": "make_root",
     "hang_on_joints": "attach_joints", "let_go": "detach_joint", "still_in": "check_owns_partition",
-    "outlived": "survived", "heir": "winning_claim", "newcomer": "new_participant",
+    "outlived": "survived", "heir": "winning_claim",
 }
 SOURCES = r"\.(cpp|hpp|ipp|idl|js|py|pyi)$"
 PAGES = r"\.md$"
@@ -87,11 +86,12 @@ def findings(name, text):
 
 
 def main():
-    names = subprocess.run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard"],
-                           capture_output=True, text=True, check=True).stdout.split()
+    folders = ("apps", "bench", "docs", "examples", "idl", "include", "python", "src", "tests")
+    files = [*ROOT.glob("*.md"), *(file for folder in folders for file in (ROOT / folder).rglob("*"))]
+    names = sorted(str(file.relative_to(ROOT)) for file in files)
     found = 0
     for name in names:
-        if not re.search(SOURCES + "|" + PAGES, name) or re.search(LEFT_OUT, name) or not (ROOT / name).exists():
+        if not re.search(SOURCES + "|" + PAGES, name) or re.search(LEFT_OUT, name):
             continue
         for number, what in findings(name, (ROOT / name).read_text(encoding="utf-8")):
             found += 1

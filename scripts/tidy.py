@@ -30,13 +30,11 @@ def fingerprint(entry, rules):
     """A hash of everything that determines clang-tidy's findings for a file; comments count, for their NOLINT."""
     arguments = shlex.split(entry["command"])
     arguments = arguments[: arguments.index("-o")] + ["-E", "-C", entry["file"]]
-    if pathlib.Path(arguments[0]).name == "ccache":
-        del arguments[0]
     text = subprocess.run(arguments, cwd=entry["directory"], check=True, capture_output=True).stdout
     return hashlib.sha256(rules + entry["command"].encode() + text).hexdigest()
 
 
-def check(entry, rules, build, stamps):
+def check(entry, rules, stamps):
     """Returns the findings, or None if there are none."""
     try:
         stamp = stamps / fingerprint(entry, rules)
@@ -45,12 +43,23 @@ def check(entry, rules, build, stamps):
     if stamp.exists():
         stamp.touch()
         return None
-    run = subprocess.run(["clang-tidy", "-p", build, "--quiet", entry["file"]],
+    run = subprocess.run(["clang-tidy", "-p", stamps, "--quiet", entry["file"]],
                          capture_output=True, text=True)
     if run.returncode == 0:
         stamp.touch()
         return None
     return run.stdout or run.stderr or "clang-tidy failed for " + entry["file"]
+
+
+def without_precompiled(command):
+    """The command as clang understands it: without ccache and without headers that another compiler precompiled."""
+    arguments = shlex.split(command)
+    if pathlib.Path(arguments[0]).name == "ccache":
+        del arguments[0]
+    while "-include" in arguments:
+        at = arguments.index("-include")
+        del arguments[at:at + 2]
+    return shlex.join(argument for argument in arguments if argument != "-Winvalid-pch")
 
 
 def changes():
@@ -86,7 +95,12 @@ def main():
     options = parser.parse_args()
     until = time.monotonic() + 60 * options.minutes
     build = options.build.resolve()
+    stamps = build / "tidy"
+    stamps.mkdir(exist_ok=True)
     commands = json.loads((build / "compile_commands.json").read_text())
+    for entry in commands:
+        entry["command"] = without_precompiled(entry["command"])
+    (stamps / "compile_commands.json").write_text(json.dumps(commands))
     ours = [entry for entry in commands
             if pathlib.Path(entry["file"]).is_relative_to(ROOT / "src")
             or pathlib.Path(entry["file"]).is_relative_to(ROOT / "apps")]
@@ -94,14 +108,12 @@ def main():
         sys.exit("tidy: no sources of src/ or apps/ in " + str(build))
     times = changes()
     ours.sort(key=lambda entry: changed(pathlib.Path(entry["file"]), times), reverse=True)
-    stamps = build / "tidy"
-    stamps.mkdir(exist_ok=True)
     rules = output_of("clang-tidy", "--version") + (ROOT / ".clang-tidy").read_bytes()
     checked = 0
     bad = 0
 
     def check_in_time(entry):
-        return check(entry, rules, build, stamps) if time.monotonic() < until else "late"
+        return check(entry, rules, stamps) if time.monotonic() < until else "late"
 
     with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
         for findings in pool.map(check_in_time, ours):

@@ -9,7 +9,7 @@
 namespace tfdude {
 namespace {
 
-// The reply to a requester if its change, or a change that its refusal depends on, is not stored.
+// The reply to a requester if its change, or a change that its rejection depends on, is not stored.
 Error unsaved(const Reply& reply, const Error& why) {
   const auto* error = std::get_if<Error>(&reply.body);
   if (error != nullptr) return error->code == Errc::kState ? *error : why;

@@ -18,7 +18,7 @@ namespace tfdude {
 ///
 /// If something could not be stored, nothing of it is published, and its requesters get kState.
 /// Storing is retried until it succeeds; meanwhile failure() says why further changes should be
-/// refused.
+/// rejected.
 ///
 /// @par Thread safety  All functions are thread-safe, except start(), which must precede stop().
 class CommitLoop {

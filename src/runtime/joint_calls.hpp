@@ -26,7 +26,7 @@ class JointCalls {
   [[nodiscard]] Result<void> publish(const JointUpdate& update);
   [[nodiscard]] Result<std::vector<JointInfo>> list(const std::string& partition);
 
-  /// Applies published positions. Refused ones are counted and logged.
+  /// Applies published positions. Rejected ones are counted and logged.
   void on_joints(const JointUpdate& update);
 
  private:

@@ -38,7 +38,7 @@ void PendingLookups::stop() {
     std::move(added_.begin(), added_.end(), std::back_inserter(left));
     added_.clear();
   }
-  // Here, since objects held by callbacks are destroyed with them.
+  // Here, since objects that callbacks own are destroyed with them.
   for (const auto& lookup : left) give_up(*lookup);
 }
 

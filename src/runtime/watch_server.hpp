@@ -20,7 +20,7 @@ class WatchServer final : private PushLoop::Sink {
         pushes_(context.threads.push, context.structure.forest, context.options.limits.watches,
                 *this) {}
 
-  /// Ends pushing; later watch requests are refused.
+  /// Ends pushing; later watch requests are rejected.
   void stop();
 
   /// The reply to a WatchRequest.
