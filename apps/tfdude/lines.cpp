@@ -10,7 +10,6 @@
 #include <poll.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
-#include <utility>
 
 #include "tfdude/base/id.hpp"
 
@@ -28,22 +27,6 @@ Result<Lines> Lines::open(const std::string& file, std::optional<double> pace) {
   return Lines(opened, signalfd(-1, &signals, SFD_CLOEXEC), pace);
 }
 
-Lines::Lines(Lines&& other) noexcept
-    : file_(std::exchange(other.file_, -1)),
-      interrupts_(std::exchange(other.interrupts_, -1)),
-      pace_(other.pace_),
-      due_(other.due_),
-      buffer_(std::move(other.buffer_)),
-      at_(other.at_),
-      ended_(other.ended_),
-      number_(other.number_) {}
-
-Lines::~Lines() {
-  for (const int descriptor : {file_, interrupts_}) {
-    if (descriptor >= 0) close(descriptor);
-  }
-}
-
 // Keeps to a schedule, so that small delays do not add up. After a long one it goes on from there,
 // instead of sending what was due meanwhile all at once.
 bool Lines::wait_until_due() {
@@ -58,7 +41,7 @@ bool Lines::wait_until_due() {
 
 // Reads what there is, waiting for something. @return false at the end, or if interrupted
 bool Lines::fill() {
-  std::array<pollfd, 2> sources{{{file_, POLLIN, 0}, {interrupts_, POLLIN, 0}}};
+  std::array<pollfd, 2> sources{{{file_.get(), POLLIN, 0}, {interrupts_.get(), POLLIN, 0}}};
   while (poll(sources.data(), sources.size(), -1) < 0) {
     if (errno != EINTR) return false;
   }
@@ -66,7 +49,7 @@ bool Lines::fill() {
   at_ = 0;
   if (sources[1].revents != 0) return false;
   std::array<char, 65536> block{};
-  const ssize_t size = read(file_, block.data(), block.size());
+  const ssize_t size = read(file_.get(), block.data(), block.size());
   if (size <= 0) return false;
   buffer_.append(block.data(), static_cast<std::size_t>(size));
   return true;

@@ -6,6 +6,8 @@
 
 #include "tfdude/base/result.hpp"
 
+#include "program.hpp"
+
 namespace tfdude::cli {
 
 /// The lines of a file or of standard input, until its end or an interrupt (SIGINT, SIGTERM, which
@@ -16,12 +18,6 @@ class Lines {
   /// @param pace  lines per second; absent: as fast as they come
   /// @return kConfig: the file cannot be opened.
   [[nodiscard]] static Result<Lines> open(const std::string& file, std::optional<double> pace);
-
-  Lines(const Lines&) = delete;
-  Lines& operator=(const Lines&) = delete;
-  Lines(Lines&& other) noexcept;
-  Lines& operator=(Lines&&) = delete;
-  ~Lines();
 
   /// The next line, when it is due; nothing at the end.
   [[nodiscard]] std::optional<std::string> next();
@@ -35,8 +31,8 @@ class Lines {
   [[nodiscard]] bool wait_until_due();
   [[nodiscard]] bool fill();
 
-  int file_;
-  int interrupts_;
+  Descriptor file_;
+  Descriptor interrupts_;
   std::optional<double> pace_;
   std::chrono::steady_clock::time_point due_ = std::chrono::steady_clock::now();  // the next line
   std::string buffer_;

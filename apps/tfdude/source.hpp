@@ -21,27 +21,43 @@ class Source {
 
   [[nodiscard]] bool live() const { return client_ != nullptr; }
   /// The end of a recording.
-  [[nodiscard]] Result<Time> now() const;
+  [[nodiscard]] Result<Time> now() const { return live() ? client_->now() : end_; }
   /// The time to compare stamps with: of a recording, the instant that it shows.
-  [[nodiscard]] Result<Time> present() const;
+  [[nodiscard]] Result<Time> present() const {
+    return live() ? client_->now() : recording_->instant();
+  }
   /// The end of a recording, to say how long before it a stamp is; absent if that is of another
   /// clock.
   [[nodiscard]] std::optional<Time> end_for(Time stamp) const;
 
   // As the functions of Client.
-  [[nodiscard]] Result<std::vector<Frame>> frames() const;
-  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions() const;
+  [[nodiscard]] Result<std::vector<Frame>> frames() const {
+    return live() ? client_->frames() : recording_->frames();
+  }
+  [[nodiscard]] Result<std::vector<PartitionInfo>> partitions() const {
+    return live() ? client_->partitions() : recording_->partitions();
+  }
   [[nodiscard]] Result<std::vector<PathSegment>> path(const std::string& a,
-                                                      const std::string& b) const;
-  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition) const;
-  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition) const;
+                                                      const std::string& b) const {
+    return live() ? client_->path(a, b) : recording_->path(a, b);
+  }
+  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition) const {
+    return live() ? client_->joints(partition) : recording_->joints(partition);
+  }
+  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition) const {
+    return live() ? client_->histories(partition) : recording_->histories(partition);
+  }
   /// A recording that does not show an instant after that of the query is read on until it has the
   /// data, as Recording::lookup_at() does. An instant before its beginning, as of stamps of another
   /// clock, is looked up at its end.
-  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
-                                                const Query& query = {}) const;
+  /// @param wait  how much of a recording is read on
   [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
                                                 const Query& query, Milliseconds wait) const;
+  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
+                                                const Query& query = {}) const {
+    constexpr Milliseconds kWait{10'000};
+    return live() ? client_->lookup(a, b, query) : lookup(a, b, query, kWait);
+  }
   [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const Query& at_a,
                                                 const std::string& b, const Query& at_b,
                                                 const std::string& fixed) const;
