@@ -98,7 +98,7 @@ TEST_CASE("values: all kinds of values and answers are equal over each transport
     CHECK(actual[i].basis.bound == expected[i].basis.bound);
     CHECK(actual[i].basis.sources == expected[i].basis.sources);
     CHECK(actual[i].basis.unspecified == expected[i].basis.unspecified);
-    bounds += actual[i].basis.bound ? 1 : 0;
+    if (actual[i].basis.bound) ++bounds;
     sources += actual[i].basis.sources.size();
     unspecified += actual[i].basis.unspecified.size();
   }

@@ -209,7 +209,7 @@ TEST_CASE("a page that does not change is published again from time to time") {
     }
   }
   CHECK(longest <= Pages::kRepeatWithin + pages.count());
-  CHECK(number <= 20'000 * (1 + 2.0 * pages.count() / Pages::kRepeatWithin));
+  CHECK(static_cast<double>(number) <= 20'000 * (1 + 2.0 * pages.count() / Pages::kRepeatWithin));
 }
 
 TEST_CASE("a replica that receives the pages in order has the owner's structure") {

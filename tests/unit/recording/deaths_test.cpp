@@ -20,7 +20,9 @@ namespace {
 
 Time at(double seconds) { return time_of(static_cast<std::int64_t>(seconds * 1e9)); }
 
-Transform shifted(double x) { return {*Pose::create(Eigen::Quaterniond::Identity(), {x, 0, 0})}; }
+Transform shifted(double x) {
+  return {*Pose::create(Eigen::Quaterniond::Identity(), {x, 0, 0}), {}};
+}
 
 // The indices of kFrames.
 constexpr std::uint32_t kArm = 0;
