@@ -2,7 +2,7 @@
 // on the transport, and is checked over loopback only, in the tests of uncertainty, unspecified
 // covariances, points and velocities.
 
-#include <array>
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -77,6 +77,12 @@ std::vector<StampedTransform> answers(Robot& robot) {
   return all;
 }
 
+// The source of an observation has the time and the process in its name.
+std::vector<std::string> kinds_of(std::vector<std::string> sources) {
+  for (std::string& source : sources) source.resize(std::min(source.find(':'), source.size()));
+  return sources;
+}
+
 }  // namespace
 
 TEST_CASE("values: all kinds of values and answers are equal over each transport") {
@@ -96,7 +102,7 @@ TEST_CASE("values: all kinds of values and answers are equal over each transport
     CHECK(testing::transform_diff(actual[i], expected[i], 1e-12) == "");
     CHECK(actual[i].stamp == expected[i].stamp);
     CHECK(actual[i].basis.bound == expected[i].basis.bound);
-    CHECK(actual[i].basis.sources == expected[i].basis.sources);
+    CHECK(kinds_of(actual[i].basis.sources) == kinds_of(expected[i].basis.sources));
     CHECK(actual[i].basis.unspecified == expected[i].basis.unspecified);
     if (actual[i].basis.bound) ++bounds;
     sources += actual[i].basis.sources.size();

@@ -363,14 +363,15 @@ TEST_CASE("member: an absence ends with the last contested frame, without anothe
   for (auto after = Milliseconds(0); after <= Absences::kTakeover; after += Milliseconds(100)) {
     arms.member.on_time(Absences::Steady(after));
   }
-  CHECK_FALSE(arms.ask(1, "foot", AddRequest{"arm", along_x(1)}));
-  REQUIRE(arms.forest.holds("foot"));
+  CHECK_FALSE(arms.ask(1, "toe", AddRequest{"arm", along_x(1)}));
+  REQUIRE(arms.forest.holds("toe"));
   arms.member.on_presence(legs, kNow);
+  arms.member.on_page({"legs", 0, 1, 3, {{"foot", "", 10}, {"toe", "foot", 10}}});
   (void)arms.member.take_outcome();
   REQUIRE(arms.directory.absent().size() == 1);
   CHECK(arms.directory.absent()[0].kind == Absent::Kind::kBack);
   (void)arms.member.stored(arms.member.take_ready());
-  REQUIRE(arms.member.release({"foot"}, kNow));
+  REQUIRE(arms.member.release({"toe"}, kNow));
   CHECK(arms.member.take_outcome().to_commit);
   const Ready ready = arms.member.take_ready();
   REQUIRE(ready.presence);
