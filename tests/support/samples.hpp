@@ -47,7 +47,7 @@ template <class Type, class Sample>
   const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
   std::copy(bytes.begin(), bytes.end(), exact.get());
   BorrowedPayload payload(exact.get(), bytes.size());
-  Type type;
+  thread_local Type type;  // as above
 #if TFDUDE_FASTDDS_MAJOR == 2
   return type.deserialize(&payload, &sample);
 #else

@@ -12,6 +12,7 @@ import rig
 
 try:
     from selenium import webdriver
+    from selenium.common.exceptions import StaleElementReferenceException
     from selenium.webdriver.chrome.service import Service
 except ImportError:
     rig.skip("python3-selenium is missing")
@@ -83,7 +84,16 @@ class Browser(unittest.TestCase):
 
     def choose_two(self, robot, browser):
         find = "return [...document.querySelectorAll('.row')].find(row => row.querySelector('.name').textContent === "
-        browser.execute_script(find + "'tool0')").click()
+
+        def clicked():
+            # The list may be drawn again between the search and the click.
+            try:
+                browser.execute_script(find + "'tool0')").click()
+                return True
+            except StaleElementReferenceException:
+                return False
+
+        rig.eventually(clicked, "a row of the list")
         self.assertEqual(browser.execute_script("return tfdude.inspector.a.value"), "world")
         answer = self.answer(browser)
         said = robot.ask("lookup", "world", "tool0")
