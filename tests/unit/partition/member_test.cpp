@@ -365,8 +365,9 @@ TEST_CASE("member: an absence ends with the last contested frame, without anothe
   }
   CHECK_FALSE(arms.ask(1, "toe", AddRequest{"arm", along_x(1)}));
   REQUIRE(arms.forest.holds("toe"));
-  arms.member.on_presence(legs, kNow);
+  // Before its presence, which alone would end the absence.
   arms.member.on_page({"legs", 0, 1, 3, {{"foot", "", 10}, {"toe", "foot", 10}}});
+  arms.member.on_presence(legs, kNow);
   (void)arms.member.take_outcome();
   REQUIRE(arms.directory.absent().size() == 1);
   CHECK(arms.directory.absent()[0].kind == Absent::Kind::kBack);
