@@ -33,8 +33,9 @@ PendingRequests::PendingRequests(ReplyTable& table, std::vector<Part>& parts,
       pause_(kFirstRepeat) {
   for (Part& part : parts_) {
     if (part.owner == kHeldHere) continue;
-    part.request.sequence = call_.entries()[requests_.size()].sequence;
-    part.request.awaits_from = call_.awaits_from();
+    const auto& entry = call_.entries()[requests_.size()];
+    part.request.sequence = entry.sequence;
+    part.request.awaits_from = entry.awaits_from;
     requests_.push_back({&part.request});
   }
 }

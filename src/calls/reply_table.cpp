@@ -19,15 +19,21 @@ ReplyTable::Call::Call(ReplyTable& table, const std::vector<std::string>& partit
   table_.idle_signals_.pop_back();
   entries_.reserve(partitions.size());
   for (const std::string& partition : partitions) {
-    table_.waiting_.emplace(++table_.last_, Waiting{this, entries_.size()});
-    entries_.push_back({partition, static_cast<std::uint32_t>(table_.last_), std::nullopt});
+    const Number number = ++table_.last_;
+    Entry& entry = entries_.emplace_back(
+        Entry{partition, static_cast<std::uint32_t>(number), 0, std::nullopt});
+    auto& waiting = table_.waiting_;
+    waiting.emplace(std::pair<std::string_view, Number>(entry.partition, number),
+                    Waiting{this, entries_.size() - 1});
+    entry.awaits_from = waiting.lower_bound({entry.partition, 0})->first.second;
   }
-  awaits_from_ = table_.waiting_.empty() ? table_.last_ + 1 : table_.waiting_.begin()->first;
 }
 
 ReplyTable::Call::~Call() {
   const Lock lock(table_.mutex_);
-  for (const Entry& entry : entries_) table_.waiting_.erase(table_.number_of(entry.sequence));
+  for (const Entry& entry : entries_) {
+    table_.waiting_.erase({entry.partition, table_.number_of(entry.sequence)});
+  }
   table_.idle_signals_.push_back(arrived_);
 }
 
@@ -48,8 +54,10 @@ bool ReplyTable::Call::waits(std::size_t entry) const {
 
 void ReplyTable::Call::give_up(std::size_t entry, Error error) {
   const Lock lock(table_.mutex_);
-  if (entries_[entry].reply) return;
-  entries_[entry].reply = Reply{entries_[entry].sequence, 0, std::move(error)};
+  Entry& given_up = entries_[entry];
+  if (given_up.reply) return;
+  given_up.reply = Reply{given_up.sequence, 0, std::move(error)};
+  table_.waiting_.erase({given_up.partition, table_.number_of(given_up.sequence)});
 }
 
 void ReplyTable::on_reply(const std::string& from, const Reply& reply) {
@@ -57,12 +65,11 @@ void ReplyTable::on_reply(const std::string& from, const Reply& reply) {
   ReplyListener* listener = nullptr;
   {
     const Lock lock(mutex_);
-    const auto waiting = waiting_.find(number_of(reply.sequence));
+    const auto waiting = waiting_.find({from, number_of(reply.sequence)});
     if (waiting == waiting_.end()) return;
-    const Call& call = *waiting->second.call;
-    auto& entry = waiting->second.call->entries_[waiting->second.entry];
-    if (entry.reply || entry.partition != from) return;
-    entry.reply = reply;
+    Call& call = *waiting->second.call;
+    call.entries_[waiting->second.entry].reply = reply;
+    waiting_.erase(waiting);
     if (call.complete()) {
       arrived = call.arrived_;
       listener = call.listener_;
@@ -76,9 +83,11 @@ void ReplyTable::on_lost(const std::string& partition) {
   std::vector<ReplyListener*> listeners;
   {
     const Lock lock(mutex_);
-    for (auto& [number, waiting] : waiting_) {
+    for (auto one = waiting_.lower_bound({partition, 0});
+         one != waiting_.end() && one->first.first == partition;) {
+      const Waiting waiting = one->second;
+      one = waiting_.erase(one);
       auto& entry = waiting.call->entries_[waiting.entry];
-      if (entry.partition != partition || entry.reply) continue;
       entry.reply = Reply{
           entry.sequence, 0,
           Error{Errc::kUnreachable, "partition " + quote(partition) + " left before it replied"}};

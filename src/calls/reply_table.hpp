@@ -6,6 +6,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/mutex.hpp"
@@ -31,10 +33,13 @@ class ReplyTable {
   struct Entry {
     std::string partition;
     std::uint32_t sequence = 0;
+    /// The lowest number for which anybody here awaited a reply of the partition when the call
+    /// started.
+    std::uint64_t awaits_from = 0;
     std::optional<Reply> reply;
   };
 
-  /// Registered with the table from its construction until its destruction.
+  /// Registered with the table until its replies have come, or its destruction.
   class Call {
    public:
     /// @param listener  null: the call is waited for. It may be told after the destruction of this.
@@ -45,9 +50,6 @@ class ReplyTable {
     Call& operator=(const Call&) = delete;
 
     [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
-
-    /// The lowest number for which anybody here awaited a reply when this call started.
-    [[nodiscard]] std::uint64_t awaits_from() const { return awaits_from_; }
 
     /// Waits until all replies have come; false at the deadline.
     [[nodiscard]] bool wait_until(Clock::time_point deadline);
@@ -64,7 +66,6 @@ class ReplyTable {
 
     ReplyTable& table_;
     std::vector<Entry> entries_;
-    std::uint64_t awaits_from_ = 0;
     Condition* arrived_;
     ReplyListener* const listener_;
   };
@@ -90,7 +91,9 @@ class ReplyTable {
   }
 
   Number last_ TFDUDE_GUARDED_BY(mutex_) = 0;
-  std::map<Number, Waiting> waiting_ TFDUDE_GUARDED_BY(mutex_);
+  // Without a reply, by partition, whose name is the entry's, and number. So the first of a
+  // partition is the one that it must still be able to answer, whatever others have to.
+  std::map<std::pair<std::string_view, Number>, Waiting> waiting_ TFDUDE_GUARDED_BY(mutex_);
   // Signals outlive their calls, so that they can be notified without the mutex. Otherwise the
   // woken thread finds it locked and sleeps again, 2 us on one processor. A call may get another
   // call's signal: it checks again.

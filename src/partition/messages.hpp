@@ -178,8 +178,9 @@ struct Request {
                PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
                DescriptionRequest>
       body;
-  /// The sender awaits no replies to requests with lower numbers, in whatever order they come. Not
-  /// greater than the full number of this request, of which `sequence` has the lower half.
+  /// The sender awaits no replies of this partition to requests with lower numbers, in whatever
+  /// order they come. Not greater than the full number of this request, of which `sequence` has the
+  /// lower half.
   std::uint64_t awaits_from = 0;
 };
 

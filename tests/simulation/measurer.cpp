@@ -47,7 +47,7 @@ void Measurer::next() {
 void Measurer::step() {
   if (process_->world().plan.leaves_out(actor_, steps_)) return next();
   process_->world().did(actor_, steps_);
-  if (doubtful_) restart();
+  if (doubtful_ || owner_changed()) restart();
   if (edges_ < kEdges) return add();
   if (random_.index(3) == 0) return look_up();
   const bool two = random_.index(2) == 0;
@@ -82,6 +82,15 @@ void Measurer::restart() {
   base_ = base_of(random_.index(owners_));
   for (std::string& partition : partitions_) partition = partition_name(random_.index(owners_));
   information_ = Eigen::Matrix3d::Identity() / (kStddev * kStddev);
+}
+
+// Another process may have read an older state than the one that has replied.
+bool Measurer::owner_changed() const {
+  for (std::size_t k = 0; k < edges_; ++k) {
+    const auto owner = process_->world().serving(partitions_.at(k));
+    if (owner == nullptr || owner->id() != owners_then_.at(k)) return true;
+  }
+  return false;
 }
 
 void Measurer::add() {
@@ -121,7 +130,7 @@ void Measurer::look_up() {
   const Section section = any_section();
   const auto task = process_->lookup(frame(section.first), frame(section.last));
   begin("lookup", task, [this, section, task](const Result<void>& outcome) {
-    if (!outcome || doubtful_) return;
+    if (!outcome || doubtful_ || owner_changed()) return;
     for (const Part& part : task->parts()) {
       for (std::size_t k = 0; k < kEdges; ++k) {
         const bool other = process_->replied_by(part) != owners_then_.at(k);

@@ -54,6 +54,7 @@ class Measurer : public std::enable_shared_from_this<Measurer> {
   void look_up();
   void begin(const std::string& what, const std::shared_ptr<Task>& task,
              std::function<void(const Result<void>&)> then);
+  [[nodiscard]] bool owner_changed() const;
   void judge(const Section& section, const StampedTransform& X);
   [[nodiscard]] Section any_section();
   [[nodiscard]] std::string frame(std::size_t number) const;  // 0: what the chain hangs on

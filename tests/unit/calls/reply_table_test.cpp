@@ -36,15 +36,24 @@ TEST_CASE("calls: every request has its own number counted from one") {
   CHECK(first.entries()[1].partition == "b");
 }
 
-TEST_CASE("calls: a call knows the lowest number whose reply is still expected") {
+TEST_CASE("calls: a call knows the lowest number whose reply is still expected of a partition") {
   ReplyTable table;
-  auto first = std::make_unique<ReplyTable::Call>(table, std::vector<std::string>{"a", "b"});
-  CHECK(first->awaits_from() == 1);
+  const auto awaited_of = [&](const std::string& partition) {
+    return ReplyTable::Call(table, {partition}).entries()[0].awaits_from;
+  };
+  auto first = std::make_unique<ReplyTable::Call>(table, std::vector<std::string>{"b", "a"});
+  CHECK(first->entries()[0].awaits_from == 1);
+  CHECK(first->entries()[1].awaits_from == 2);
   const ReplyTable::Call second(table, {"a"});
-  CHECK(second.awaits_from() == 1);
+  CHECK(second.entries()[0].awaits_from == 2);
+  CHECK(awaited_of("b") == 1);
+  CHECK(awaited_of("c") == 5);
+  answer(table, first->entries()[1], 20);
+  CHECK(awaited_of("a") == 3);
+  CHECK(awaited_of("a") == 3);
+  CHECK(awaited_of("b") == 1);
   first.reset();
-  CHECK(ReplyTable::Call(table, {"a"}).awaits_from() == 3);
-  CHECK(ReplyTable::Call(table, {"a"}).awaits_from() == 3);
+  CHECK(awaited_of("b") == 9);
 }
 
 TEST_CASE("calls: a call is complete when every partition has replied in any order") {
