@@ -178,27 +178,32 @@ PushedValues WatchedGroup::changed(const Forest& forest) {
 }
 
 Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<Time> from) const {
-  // Only the newest, as if all others were known.
-  auto newest = forest.segments_since(request_.segments, {UINT64_MAX, Time::max(), true}, 0);
-  if (!newest) return tl::unexpected(std::move(newest.error()));
-  const SegmentValues* found = &newest->back();
+  // As if all others were known.
+  const SeenSegments seen{UINT64_MAX, from.value_or(Time::max()), !from};
+  const std::size_t most = kMaxItems / request_.segments.size();
+  // Besides the values at `from` and the newest ones.
+  const auto all =
+      forest.segments_since(request_.segments, seen, std::max<std::size_t>(most, 2) - 2);
+  if (!all) return tl::unexpected(all.error());
+  const SegmentValues& newest = all->back();
   if (forest.have_noise(request_.segments)) {
     const PathEnds& first = request_.segments.front();
     return fail(Errc::kInvalidInput,
                 "the path from " + quote(first.from) + " to " + quote(first.to) +
                     " cannot be sent as one transform: an edge of it has process noise");
   }
-  PushedValues pushed{id_, entries_of(*found), 0, found->commit};
-  if (from && found->stamp && *from < *found->stamp) {
+  PushedValues pushed{id_, {}, 0, newest.commit};
+  const auto add = [&](const SegmentValues& values) {
+    for (PushedValue& entry : entries_of(values)) pushed.entries.push_back(std::move(entry));
+  };
+  if (from && newest.stamp && *from < *newest.stamp && most >= 2) {
     Query query;
     query.at = from;
-    // If that is not available, the newest must do.
+    // If that is not available, what came later must do.
     const auto then = forest.lookup_segments(request_.segments, query);
-    if (then && then->history == found->history) {
-      const auto entries = entries_of(*then);
-      pushed.entries.insert(pushed.entries.begin(), entries.begin(), entries.end());
-    }
+    if (then && then->history == newest.history) add(*then);
   }
+  for (const SegmentValues& values : *all) add(values);
   for (std::size_t i = 0; i < request_.segments.size(); ++i) {
     pushed.entries[i].process_noise = Covariance();
   }

@@ -147,6 +147,7 @@ WatchLoop::Answered WatchLoop::ask(Watched& watched, const std::vector<Watched::
       return Answered::kNotUntilRenewal;
     }
   }
+  if (all && from) watched.on_told_from(*from);
   return all ? Answered::kAll : Answered::kPartly;
 }
 

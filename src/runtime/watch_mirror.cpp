@@ -108,6 +108,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
     }
     edges_[i].history = edge.history;
     edges_[i].newest = edge.newest;
+    edges_[i].complete = edge.complete;
   }
   forest_.take(handles_, values);
 }
@@ -134,6 +135,20 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   return entry;
 }
 
+void WatchMirror::note_skipped(const Source& source, const PushedValues& answer) {
+  std::vector<bool> seen(source.edges.size(), false);
+  for (const PushedValue& entry : answer.entries) {
+    if (entry.index >= seen.size() || seen[entry.index] || !entry.stamp) continue;
+    seen[entry.index] = true;  // its first sample
+    const std::uint32_t index = source.edges[entry.index];
+    if (index >= edges_.size() || edges_[index].history == 0) continue;
+    const Edge& edge = edges_[index];
+    const bool begins = entry.history > edge.history;
+    const Time known = begins ? Time() : edge.complete.value_or(Time());
+    if (*entry.stamp > known) skipped_from_ = std::min(skipped_from_.value_or(known), known);
+  }
+}
+
 bool WatchMirror::has(std::uint64_t group) const {
   return std::any_of(route_.sources.begin(), route_.sources.end(),
                      [&](const WatchRoute::Source& source) { return source.group == group; });
@@ -152,10 +167,16 @@ bool WatchMirror::take(const PushedValues& pushed) {
   const bool follows_on = in_order && !is_old;
   // Before the first complete values there is nothing that a sample could belong to.
   if (!source.received.answered()) return false;
+  if (whole->after == 0 && !is_old) note_skipped(source, *whole);
   std::vector<PushedValue> values;
   for (PushedValue& entry : whole->entries) {
     if (auto value = admitted(source, std::move(entry), follows_on)) {
       values.push_back(*std::move(value));
+    }
+  }
+  if (!source.received.lacks()) {
+    for (const std::uint32_t index : source.edges) {
+      if (index < edges_.size()) edges_[index].complete = edges_[index].newest;
     }
   }
   forest_.take(handles_, values, !is_old);

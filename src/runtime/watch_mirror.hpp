@@ -93,10 +93,19 @@ class WatchMirror {
   /// before it: its owner may have an earlier one.
   [[nodiscard]] std::optional<Time> lacks_history() const;
 
+  /// The instant after which answers have left samples out, as an answer tells only the newest ones
+  /// unless it is asked for more: messages were lost before it, or come after it.
+  [[nodiscard]] std::optional<Time> skipped_from() const { return skipped_from_; }
+  /// All samples from this instant on have been told since.
+  void told_from(Time from) {
+    if (skipped_from_ && *skipped_from_ >= from) skipped_from_.reset();
+  }
+
  private:
   struct Edge {
-    std::uint64_t history = 0;   // the owner's number; 0: unknown
-    std::optional<Time> newest;  // of its samples
+    std::uint64_t history = 0;     // the owner's number; 0: unknown
+    std::optional<Time> newest;    // of its samples
+    std::optional<Time> complete;  // up to which none is missing
     std::size_t source = 0;
   };
   struct Source {
@@ -107,6 +116,7 @@ class WatchMirror {
   /// The entry to apply, unless it is old or must wait.
   [[nodiscard]] std::optional<PushedValue> admitted(const Source& source, PushedValue entry,
                                                     bool follows_on);
+  void note_skipped(const Source& source, const PushedValues& answer);
   [[nodiscard]] const Source* source_like(const WatchRoute::Source& source) const;
 
   WatchRoute route_;
@@ -116,6 +126,7 @@ class WatchMirror {
   std::vector<Handle> handles_;  // by edge, as the others
   std::vector<Edge> edges_;
   std::vector<Source> sources_;
+  std::optional<Time> skipped_from_;
 };
 
 }  // namespace tfdude

@@ -121,7 +121,7 @@ bool WatchedPath::is_gone(const Error& error, Clock::time_point now) {
 
 bool WatchedPath::follows(const WatchRoute& route) const {
   const Lock lock(mutex_);
-  const auto& latest = next_ != nullptr ? next_ : followed_;
+  const WatchMirror* latest = this->latest();
   return latest != nullptr && latest->route().is_same(route);
 }
 
@@ -154,8 +154,8 @@ bool WatchedPath::take(const PushedValues& pushed) {
     }
     if (next_ != nullptr && next_->take(pushed)) is_new = true;
     rerouted = swap_if_ready();
-    const auto& latest = next_ != nullptr ? next_ : followed_;
-    lacks = latest != nullptr && latest->lacks();
+    const WatchMirror* latest = this->latest();
+    lacks = (latest != nullptr && latest->lacks()) || skipped_from();
     if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
   }
   tell();  // late samples are not new to show, but may be waited for
@@ -226,12 +226,31 @@ void WatchedPath::interrupt(Error why) {
 bool WatchedPath::up_to_date() const {
   const Lock lock(mutex_);
   if (next_ != nullptr || followed_ == nullptr || followed_->lacks()) return false;
+  if (skipped_from()) return false;
   return asked_for_history_ >= kMostAskedForHistory || !followed_->lacks_history();
 }
 
-std::optional<Time> WatchedPath::lacks_history() {
+std::optional<Time> WatchedPath::skipped_from() const {
+  const WatchMirror* latest = this->latest();
+  // At a lower rate, samples are left out anyway.
+  return latest == nullptr || options_.rate > 0 ? std::nullopt : latest->skipped_from();
+}
+
+void WatchedPath::on_told_from(Time from) {
   const Lock lock(mutex_);
-  const auto& latest = next_ != nullptr ? next_ : followed_;
+  if (WatchMirror* latest = this->latest()) latest->told_from(from);
+}
+
+std::optional<Time> WatchedPath::lacks_from() {
+  const Lock lock(mutex_);
+  const auto skipped = skipped_from();
+  const auto from = lacks_history();
+  if (!skipped || !from) return skipped ? skipped : from;
+  return std::min(*skipped, *from);
+}
+
+std::optional<Time> WatchedPath::lacks_history() {
+  const WatchMirror* latest = this->latest();
   if (latest == nullptr || !latest->complete() || asked_for_history_ >= kMostAskedForHistory)
     return {};
   const auto from = latest->lacks_history();

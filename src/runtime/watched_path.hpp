@@ -87,8 +87,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   /// An owner that has returned has to send its values first: until then old ones are shown.
   void on_complete() override { set_health({}); }
   [[nodiscard]] bool lacks(Clock::time_point /*now*/) const override { return !up_to_date(); }
-  [[nodiscard]] std::optional<Time> lacks_from() override { return lacks_history(); }
-  [[nodiscard]] std::optional<Time> lacks_earlier() override { return lacks_history(); }
+  [[nodiscard]] std::optional<Time> lacks_from() override;
+  [[nodiscard]] std::optional<Time> lacks_earlier() override { return lacks_from(); }
+  void on_told_from(Time from) override;
   [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
   [[nodiscard]] unsigned periods() const override { return 1; }
 
@@ -99,8 +100,6 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   bool prepare(WatchRoute route);
   /// Whether the route is shown with all values of its owners, as far as they are available.
   [[nodiscard]] bool up_to_date() const;
-  /// See WatchMirror::lacks_history(); returned a few times only, as no owner may have the samples.
-  [[nodiscard]] std::optional<Time> lacks_history();
   /// Sets the reason why there is no answer for now.
   void interrupt(Error why);
   /// Whether the error means that the path no longer exists. The news of a move may come before
@@ -123,6 +122,13 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
 
   /// Whether the pushed values suffice for this query.
   [[nodiscard]] bool has_data(const Query& query) const;
+  /// The mirror that takes values: of the next route, if there is one. Null: there is none.
+  [[nodiscard]] WatchMirror* latest() const TFDUDE_REQUIRES(mutex_) {
+    return next_ != nullptr ? next_.get() : followed_.get();
+  }
+  [[nodiscard]] std::optional<Time> skipped_from() const TFDUDE_REQUIRES(mutex_);
+  /// See WatchMirror::lacks_history(); returned a few times only, as no owner may have the samples.
+  [[nodiscard]] std::optional<Time> lacks_history() TFDUDE_REQUIRES(mutex_);
   /// Sets whether all owners are reachable, and have sent their values since.
   void set_health(Result<void> health);
   void report(std::string what);

@@ -211,6 +211,10 @@ TEST_CASE("a composed segment is sent again where late samples and static edges 
   CHECK(listed(group.next_push(arm.forest)) ==
         "0@5=205 0@10=210 0@20=220 0@25=226 0@30=230 0@40=240 ");
   CHECK(listed(group.next_push(arm.forest)).empty());
+  CHECK(listed(*group.snapshot(arm.forest, ms(12))) ==
+        "0@12=212 0@20=220 0@25=226 0@30=230 0@40=240 ");
+  CHECK(listed(*group.snapshot(arm.forest, ms(0))) ==
+        "0@5=205 0@10=210 0@20=220 0@25=226 0@30=230 0@40=240 ");
 }
 
 TEST_CASE("a late sample changes composed values also at the stamps of other edges") {

@@ -206,4 +206,33 @@ TEST_CASE("watch mirror: it knows from which instant on it lacks samples") {
   CHECK(watched.mirror.lookup({})->stamp == ms(20));
 }
 
+TEST_CASE("watch mirror: it knows which samples an answer leaves out") {
+  Watched watched;
+  WatchMirror& mirror = watched.mirror;
+  CHECK(mirror.take({kTools, {sample(0, 10, 100, 1)}, 3, 4}));
+  CHECK(mirror.take({kTools, {sample(0, 20, 110, 1)}, 4, 5}));
+  // The same again, and an answer without a newer sample.
+  CHECK_FALSE(mirror.take({kTools, {sample(0, 20, 110, 1, true)}, 0, 5}));
+  CHECK(mirror.take({kTools, {sample(0, 20, 110, 1, true)}, 0, 6}));
+  CHECK_FALSE(mirror.skipped_from());
+  // Commit 7 is lost: whatever came after it, samples may be missing after the last complete one.
+  CHECK(mirror.take({kTools, {sample(0, 40, 130, 1)}, 7, 8}));
+  CHECK(mirror.lacks());
+  CHECK(mirror.take({kTools, {sample(0, 40, 130, 1, true)}, 0, 8}));
+  CHECK_FALSE(mirror.lacks());
+  CHECK(mirror.skipped_from() == ms(20));
+  const std::vector<PushedValue> all{sample(0, 20, 110, 1, true), sample(0, 30, 120, 1),
+                                     sample(0, 40, 130, 1), sample(0, 50, 150, 1)};
+  CHECK(mirror.take({kTools, all, 0, 9}));
+  mirror.told_from(ms(20));
+  CHECK_FALSE(mirror.skipped_from());
+  CHECK(mirror.lookup(at(30))->pose.translation().x() == Approx(131));
+  // An edge that had no sample, and one whose history began again, lack all.
+  CHECK(mirror.take({kArms, {sample(0, 50, 1, 1, true)}, 0, 6}));
+  CHECK(mirror.skipped_from() == Time());
+  mirror.told_from(Time());
+  CHECK(mirror.take({kTools, {sample(0, 60, 140, 9, true)}, 0, 10}));
+  CHECK(mirror.skipped_from() == Time());
+}
+
 }  // namespace tfdude
