@@ -20,6 +20,7 @@ std::string describe(const Observed& observed) {
   if (std::isfinite(observed.limit)) text += format(", limit %.3f", observed.limit);
   text += "\n";
   if (!observed.corrected.empty()) text += "corrected    " + joined(observed.corrected) + "\n";
+  if (!observed.forgotten.empty()) text += "forgotten    " + joined(observed.forgotten) + "\n";
   if (observed.accepted && observed.corrected.empty()) text += "corrected    nothing\n";
   return text;
 }
@@ -32,7 +33,8 @@ nlohmann::json json_of(const Observed& observed) {
                       {"distance_squared", finite(observed.distance_squared)},
                       {"dimensions", observed.dimensions},
                       {"limit", finite(observed.limit)},
-                      {"corrected", observed.corrected}};
+                      {"corrected", observed.corrected},
+                      {"forgotten", observed.forgotten}};
   add_stamp(json, observed.stamp);
   return json;
 }

@@ -150,6 +150,8 @@ void bind_statistics(py::module_& module) {
       .def_readonly("dimensions", &Observed::dimensions, "Of that distance.")
       .def_readonly("limit", &Observed::limit, "Of the gate.")
       .def_readonly("corrected", &Observed::corrected, "The edges whose values changed.")
+      .def_readonly("forgotten", &Observed::forgotten,
+                    "Edges that were correlated with the path's, and are not any more.")
       .def_property_readonly(
           "stamp", [](const Observed& observed) { return from_stamp(observed.stamp); },
           "Of the corrected dynamic edges [ns], or None.");

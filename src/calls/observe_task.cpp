@@ -1,6 +1,7 @@
 #include "calls/observe_task.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -17,8 +18,25 @@ namespace {
 constexpr int kObserveAttempts = 8;
 
 // How often, and for how long, to wait for another observation to reach all owners.
-constexpr int kTornAttempts = 5;
+constexpr int kTornAttempts = 2;
 constexpr Milliseconds kTornPause{1};
+
+// Whether a value differs by more than rounding, in units of its error.
+bool has_changed(const Belief& before, const Belief& after) {
+  constexpr double kRounding = 1e-9;
+  const Transform X = collapse(before);
+  const Transform Y = collapse(after);
+  const Covariance::Upper& old = X.covariance.of_specified().upper();
+  const Covariance::Upper& now = Y.covariance.of_specified().upper();
+  const Twist moved = log(X.pose.inverse() * Y.pose);
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    const double variance = old[upper_index(axis, axis)];
+    if (std::abs(now[upper_index(axis, axis)] - variance) > kRounding * variance) return true;
+    const double move = moved[static_cast<Eigen::Index>(axis)];
+    if (move * move > kRounding * kRounding * variance) return true;
+  }
+  return before.unspecified != after.unspecified;
+}
 
 }  // namespace
 
@@ -40,7 +58,12 @@ std::vector<std::string> ObserveTask::frames() const {
 Result<void> ObserveTask::plan(const Directory& directory, Clock::time_point) {
   stage_ = Stage::kNewest;
   const auto& [a, b, X_AB, stamp, options] = measurement_;
-  auto planned = route_observe(forest_, directory, a, b, beside_, stamp);
+  std::vector<std::string> beside;
+  std::copy_if(beside_.begin(), beside_.end(), std::back_inserter(beside),
+               [&](const std::string& id) {
+                 return std::count(left_out_.begin(), left_out_.end(), id) == 0;
+               });
+  auto planned = route_observe(forest_, directory, a, b, beside, stamp);
   if (!planned) return tl::unexpected(std::move(planned.error()));
   plan_ = *std::move(planned);
   return {};
@@ -54,33 +77,64 @@ Result<Task::Next> ObserveTask::take(std::vector<Reply> replies, Clock::time_poi
     case Stage::kFirst:
       return first(std::move(replies.front()));
     case Stage::kOthers:
+      return others(replies);
+    case Stage::kPresent:
+      return present(std::move(replies));
+    case Stage::kTakeBack:
       break;
   }
-  return others(replies);
+  return taken_back(replies);
+}
+
+bool ObserveTask::leave_out_silent(const std::vector<Reply>& replies) {
+  bool any = false;
+  for (std::size_t i = plan_.path_parts; i < replies.size(); ++i) {
+    if (!std::holds_alternative<Error>(replies[i].body)) continue;
+    for (std::string& id : plan_.beside(i)) left_out_.push_back(std::move(id));
+    any = true;
+  }
+  return any;
 }
 
 // The values of all edges of the plan, at one instant.
 Result<Task::Next> ObserveTask::values(std::vector<Reply> replies, Clock::time_point now) {
+  pause_ = Milliseconds(0);
+  if (leave_out_silent(replies)) return Next::kPlan;
   auto answers = values_of(std::move(replies));
   if (!answers) return tl::unexpected(std::move(answers.error()));
   if (stage_ == Stage::kNewest) {
+    std::vector<SegmentValues> beside(
+        std::make_move_iterator(answers->begin() + static_cast<std::ptrdiff_t>(plan_.path_parts)),
+        std::make_move_iterator(answers->end()));
+    answers->resize(plan_.path_parts);
     OneInstant found = one_instant(*std::move(answers), std::nullopt);
+    found.answers.insert(found.answers.end(), std::make_move_iterator(beside.begin()),
+                         std::make_move_iterator(beside.end()));
     if (found.ask_again) {
-      for (Part& part : plan_.parts) {
-        std::get<LookupRequest>(part.request.body).query.at = found.ask_again;
+      for (std::size_t i = 0; i < plan_.path_parts; ++i) {
+        std::get<LookupRequest>(plan_.parts[i].request.body).query.at = found.ask_again;
       }
       stage_ = Stage::kInstant;
       return Next::kAsk;
     }
     answers = std::move(found.answers);
   }
-  const auto path = observed_path(plan_, *answers);
+  auto path = observed_path(plan_, *answers);
   if (!path) return tl::unexpected(path.error());
-  return observe(*path, now);
+  path_ = *std::move(path);
+  if (path_.moving.empty()) return observe(path_, now);
+  left_out_.insert(left_out_.end(), path_.moving.begin(), path_.moving.end());
+  return Next::kPlan;
 }
 
 Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_point now) {
-  const auto& missing = path.missing;
+  std::vector<std::string> missing = path.missing;
+  missing.erase(std::remove_if(missing.begin(), missing.end(),
+                               [&](const std::string& id) {
+                                 return std::count(left_out_.begin(), left_out_.end(), id) > 0 ||
+                                        std::count(beside_.begin(), beside_.end(), id) > 0;
+                               }),
+                missing.end());
   const auto is_new = [&](const std::string& id) {
     return std::find(unknown_.begin(), unknown_.end(), id) == unknown_.end();
   };
@@ -112,11 +166,18 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
 // that have seen the same values, one is rejected there, and can retry before anything was applied.
 Result<Task::Next> ObserveTask::apply(const ObservedPath& path, const Observation& found) {
   observed_ = {
-      found.distance_squared, found.dimensions, found.limit, found.accepted, {}, path.stamp};
+      found.distance_squared, found.dimensions, found.limit, found.accepted, {}, {}, path.stamp};
   for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
-    if (found.edges[k].corrected) observed_.corrected.push_back(plan_.edges[k].info.id);
+    const ObservedResult& edge = found.edges[k];
+    const std::string& id = plan_.edges[k].info.id;
+    if (edge.corrected && has_changed(path.edges[k].X_PC, edge.X_PC)) {
+      observed_.corrected.push_back(id);
+    }
+    if (edge.forgotten) observed_.forgotten.push_back(id);
   }
   shares_ = revisions(plan_, path, found);
+  owners_ = shares_.size();
+  applied_.clear();
   if (shares_.empty()) return Next::kDone;
   const auto first = std::min_element(
       shares_.begin(), shares_.end(),
@@ -134,26 +195,56 @@ Result<Task::Next> ObserveTask::first(Reply reply) {
   if (error != nullptr && error->code == Errc::kChangedMeanwhile) return again();
   if (error != nullptr) return tl::unexpected(std::move(*error));
   if (later_.empty()) return Next::kDone;
-  shares_ = std::move(later_);
+  applied_ = std::exchange(shares_, std::move(later_));
   stage_ = Stage::kOthers;
   return Next::kAsk;
 }
 
-Result<Task::Next> ObserveTask::others(const std::vector<Reply>& replies) const {
-  std::size_t done = 1;
+Result<Task::Next> ObserveTask::others(const std::vector<Reply>& replies) {
   std::optional<Error> refused;
-  for (const Reply& reply : replies) {
-    const auto* error = std::get_if<Error>(&reply.body);
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    const auto* error = std::get_if<Error>(&replies[i].body);
     if (error == nullptr) {
-      ++done;
+      applied_.push_back(shares_[i]);
     } else if (!refused) {
       refused = *error;
     }
   }
   if (!refused) return Next::kDone;
-  refused->message += "; " + std::to_string(done) + " of " + std::to_string(replies.size() + 1) +
+  refused_ = *std::move(refused);
+  shares_.clear();
+  for (const Part& part : applied_) shares_.push_back(present_values(plan_, part));
+  stage_ = Stage::kPresent;
+  return Next::kAsk;
+}
+
+Result<Task::Next> ObserveTask::present(std::vector<Reply> replies) {
+  shares_.clear();
+  std::vector<Part> left;
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    const auto* values = std::get_if<SegmentValues>(&replies[i].body);
+    auto back = values != nullptr ? tfdude::taken_back(plan_, path_, applied_[i], *values)
+                                  : std::optional<Part>();
+    if (back) {
+      shares_.push_back(*std::move(back));
+    } else {
+      left.push_back(applied_[i]);
+    }
+  }
+  applied_ = std::move(left);
+  stage_ = Stage::kTakeBack;
+  if (shares_.empty()) return taken_back({});
+  return Next::kAsk;
+}
+
+Result<Task::Next> ObserveTask::taken_back(const std::vector<Reply>& replies) {
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    if (std::holds_alternative<Error>(replies[i].body)) applied_.push_back(shares_[i]);
+  }
+  if (applied_.empty() && refused_.code == Errc::kChangedMeanwhile) return again();
+  refused_.message += "; " + std::to_string(applied_.size()) + " of " + std::to_string(owners_) +
                       " partitions have applied their part of the observation";
-  return tl::unexpected(*std::move(refused));
+  return tl::unexpected(refused_);
 }
 
 Result<Task::Next> ObserveTask::again() {

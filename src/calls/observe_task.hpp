@@ -19,8 +19,9 @@ struct Measurement {
 };
 
 /// Applies a measurement: asks for all edges of the path at one instant, computes their
-/// corrections, and sends each owner its share. If nothing was applied because an edge has changed
-/// meanwhile, it does all of this again.
+/// corrections, and sends each owner its share. If an edge has changed meanwhile, or its owner
+/// cannot be reached any more, it takes back what others have applied; after a change it does all
+/// of this again.
 class ObserveTask final : public Task {
  public:
   /// @param source  a name of the measurement's error that no other has
@@ -46,14 +47,20 @@ class ObserveTask final : public Task {
     kInstant,  ///< asks for the values at the latest common time
     kFirst,    ///< the first owner is asked to apply its share
     kOthers,   ///< and then all others
+    kPresent,  ///< one has not: asks those that have for what they have now
+    kTakeBack,
   };
 
   [[nodiscard]] Result<Next> values(std::vector<Reply> replies, Clock::time_point now);
   [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
   [[nodiscard]] Result<Next> apply(const ObservedPath& path, const Observation& found);
   [[nodiscard]] Result<Next> first(Reply reply);
-  [[nodiscard]] Result<Next> others(const std::vector<Reply>& replies) const;
+  [[nodiscard]] Result<Next> others(const std::vector<Reply>& replies);
+  [[nodiscard]] Result<Next> present(std::vector<Reply> replies);
+  [[nodiscard]] Result<Next> taken_back(const std::vector<Reply>& replies);
   [[nodiscard]] Result<Next> again();
+  /// Leaves edges beside the path out whose owners have not answered. @return whether there are any
+  [[nodiscard]] bool leave_out_silent(const std::vector<Reply>& replies);
 
   const Forest& forest_;
   const Measurement measurement_;
@@ -62,10 +69,15 @@ class ObserveTask final : public Task {
   const TimeLimit limit_;
   Stage stage_ = Stage::kNewest;
   ObservePlan plan_;
-  std::vector<std::string> beside_;   // edges that were observed with some of the path
-  std::vector<std::string> unknown_;  // further ones, of which others have been asked
+  std::vector<std::string> beside_;    // edges that were observed with some of the path
+  std::vector<std::string> unknown_;   // further ones, of which others have been asked
+  std::vector<std::string> left_out_;  // edges that were, but cannot be corrected now
+  ObservedPath path_;
   std::vector<Part> shares_;
-  std::vector<Part> later_;  // shares of all owners but the first
+  std::vector<Part> later_;    // shares of all owners but the first
+  std::vector<Part> applied_;  // shares that owners have applied
+  std::size_t owners_ = 0;     // that have a share
+  Error refused_{};            // why another one has not
   Observed observed_;
   int attempts_ = 0;
   int torn_ = 0;

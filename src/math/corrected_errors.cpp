@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
+#include "math/low_rank.hpp"
 #include "math/semidefinite.hpp"
 #include "math/symmetric_eigen.hpp"
 
@@ -14,20 +16,18 @@ namespace {
 
 using Matrix = Eigen::MatrixXd;
 
-// The fraction of the largest eigenvalue that may be rounding.
-constexpr double kRounding = 1e-14;
-
 // L with L Lᵀ = A⁺.
 Matrix6d inverse_root(const Matrix6d& semidefinite) {
   const SymmetricEigen eigen = symmetric_eigen(pseudo_inverse(semidefinite));
   return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
-// Columns over all edges, six rows each, which are added to the joint covariance or subtracted from
-// it.
-class SignedColumns {
+// The joint covariance of all edges, six rows each: own parts, and columns that are added to it or
+// subtracted from it.
+class JointCovariance {
  public:
-  explicit SignedColumns(std::size_t edges) : columns_(6 * static_cast<Eigen::Index>(edges), 0) {}
+  explicit JointCovariance(std::size_t edges)
+      : edges_(static_cast<Eigen::Index>(edges)), columns_(6 * edges_, 0) {}
 
   void append(const std::vector<Loading>& loadings, bool subtracts) {
     const Eigen::Index first = columns_.cols();
@@ -40,10 +40,56 @@ class SignedColumns {
     signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
   }
 
-  // Writes the same sum with the fewest columns, as common errors of one source. All edges that
-  // share the source are here. Columns beyond the maximum that subtract may therefore be dropped.
-  // Those that add go to the own parts: no correlation of n parts exceeds n times their sum.
+  // Makes the errors of an edge independent of all others.
+  void forget(std::vector<CorrectedError>& edges, std::size_t edge) {
+    auto rows = columns_.middleRows(6 * static_cast<Eigen::Index>(edge), 6);
+    edges[edge].own =
+        nearest_semidefinite(edges[edge].own + rows * signs_.asDiagonal() * rows.transpose());
+    rows.setZero();
+  }
+
+  // How much the errors of two edges are correlated: the sum of the squares of the correlations of
+  // their elements.
+  [[nodiscard]] double correlation(const std::vector<CorrectedError>& edges, std::size_t a,
+                                   std::size_t b) const {
+    const auto F_a = columns_.middleRows(6 * static_cast<Eigen::Index>(a), 6);
+    const auto F_b = columns_.middleRows(6 * static_cast<Eigen::Index>(b), 6);
+    const Matrix6d both = F_a * signs_.asDiagonal() * F_b.transpose();
+    const auto inverse_deviations = [&](const auto& F, std::size_t i) {
+      const Twist variances = edges[i].own.diagonal() + (F.cwiseAbs2() * signs_);
+      return Twist(variances.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; }));
+    };
+    return (inverse_deviations(F_a, a).asDiagonal() * both *
+            inverse_deviations(F_b, b).asDiagonal())
+        .squaredNorm();
+  }
+
+  // Writes the same joint covariance with few columns, as common errors of new sources. All edges
+  // that share the sources are here.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
+    const Signed own = with_signs();
+    const Eigen::Index count = own.less.cols() + own.more.cols();
+    auto hubs = by_hubs(dense(edges), rounding(edges), std::min(count, kMostColumns));
+    if (!hubs) return give_with_signs(edges, name, own);
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      edges[i].own = hubs->own.middleRows(6 * static_cast<Eigen::Index>(i), 6);
+    }
+    add_common(edges, name, hubs->F, false);
+  }
+
+ private:
+  // Of all sources together.
+  static constexpr Eigen::Index kMostColumns = 4 * kMaxLoadingColumns;
+  // Of the sum of what is subtracted from each other.
+  static constexpr double kRounding = 1e-14;
+
+  // The fewest columns with the same sum.
+  struct Signed {
+    Matrix less;
+    Matrix more;
+  };
+
+  [[nodiscard]] Signed with_signs() const {
     const Eigen::HouseholderQR<Matrix> qr(columns_);
     const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
     const Matrix thin = qr.householderQ() * Matrix::Identity(columns_.rows(), rank);
@@ -53,43 +99,89 @@ class SignedColumns {
     const Eigen::VectorXd& values = solver.eigenvalues();  // ascending
     const Matrix vectors = thin * solver.eigenvectors();
     const double least = kRounding * values.cwiseAbs().maxCoeff();
-    Matrix less(columns_.rows(), 0);
-    Matrix more(columns_.rows(), 0);
+    Signed found{Matrix(columns_.rows(), 0), Matrix(columns_.rows(), 0)};
     const auto put = [&](Matrix& to, Eigen::Index k) {
       to.conservativeResize(Eigen::NoChange, to.cols() + 1);
       to.rightCols(1) = vectors.col(k) * std::sqrt(std::abs(values[k]));
     };
-    for (Eigen::Index k = 0; k < rank && values[k] < -least && less.cols() < kMaxLoadingColumns;
-         ++k) {
-      put(less, k);
-    }
-    for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) {
-      if (more.cols() < kMaxLoadingColumns) {
-        put(more, k);
-        continue;
-      }
-      for (std::size_t i = 0; i < edges.size(); ++i) {
-        const Twist part = vectors.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
-        edges[i].own += static_cast<double>(edges.size()) * values[k] * part * part.transpose();
-      }
-    }
-    add_common(edges, name, less, true);
-    add_common(edges, name, more, false);
+    for (Eigen::Index k = 0; k < rank && values[k] < -least; ++k) put(found.less, k);
+    for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) put(found.more, k);
+    return found;
   }
 
- private:
+  // Columns beyond the maximum that subtract may be dropped. Those that add go to the own parts: no
+  // correlation of n parts exceeds n times their sum.
+  static void give_with_signs(std::vector<CorrectedError>& edges, const std::string& name,
+                              const Signed& columns) {
+    const auto& [less, more] = columns;
+    for (Eigen::Index k = kMostColumns; k < more.cols(); ++k) {
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Twist part = more.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
+        edges[i].own += static_cast<double>(edges.size()) * part * part.transpose();
+      }
+    }
+    add_common(edges, name, less.leftCols(std::min(less.cols(), kMostColumns)), true);
+    add_common(edges, name, more.leftCols(std::min(more.cols(), kMostColumns)), false);
+  }
+
+  // All edges get the first source, by which others see that it is the same observation.
   static void add_common(std::vector<CorrectedError>& edges, const std::string& name,
                          const Matrix& all, bool subtracts) {
-    if (all.cols() == 0) return;
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      const Loading part = all.middleRows(6 * static_cast<Eigen::Index>(i), 6);
-      edges[i].common_errors.push_back({name, subtracts, part});
+    for (Eigen::Index first = 0; first < all.cols(); first += kMaxLoadingColumns) {
+      const Eigen::Index count = std::min(kMaxLoadingColumns, all.cols() - first);
+      const std::string source =
+          first == 0 ? name : name + "+" + std::to_string(first / kMaxLoadingColumns);
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Loading part = all.block(6 * static_cast<Eigen::Index>(i), first, 6, count);
+        if (first > 0 && part.isZero(0)) continue;
+        edges[i].common_errors.push_back({source, subtracts, part});
+      }
     }
   }
 
+  [[nodiscard]] Matrix dense(const std::vector<CorrectedError>& edges) const {
+    Matrix P = columns_ * signs_.asDiagonal() * columns_.transpose();
+    for (Eigen::Index i = 0; i < edges_; ++i) {
+      P.block<6, 6>(6 * i, 6 * i) += edges[static_cast<std::size_t>(i)].own;
+    }
+    return P;
+  }
+
+  // The root of the rounding of what was added and subtracted in each row.
+  [[nodiscard]] Eigen::VectorXd rounding(const std::vector<CorrectedError>& edges) const {
+    Eigen::VectorXd sums = columns_.rowwise().squaredNorm();
+    for (Eigen::Index i = 0; i < edges_; ++i) {
+      sums.segment<6>(6 * i) += edges[static_cast<std::size_t>(i)].own.diagonal();
+    }
+    return (kRounding * sums).cwiseSqrt();
+  }
+
+  const Eigen::Index edges_;
   Matrix columns_;
   Eigen::VectorXd signs_;
 };
+
+// If more edges are correlated than may be, forgets that of those beside the path which are the
+// least correlated with it.
+void forget_least(const JointPrior& prior, JointCovariance& joint,
+                  std::vector<CorrectedError>& edges) {
+  if (edges.size() <= kMaxObservedTogether) return;
+  std::vector<std::pair<double, std::size_t>> beside;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (!prior.is_beside(i)) continue;
+    double sum = 0;
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      if (!prior.is_beside(k)) sum += joint.correlation(edges, i, k);
+    }
+    beside.emplace_back(sum, i);
+  }
+  std::sort(beside.begin(), beside.end());
+  const std::size_t count = std::min(edges.size() - kMaxObservedTogether, beside.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    joint.forget(edges, beside[k].second);
+    edges[beside[k].second].forgotten = true;
+  }
+}
 
 }  // namespace
 
@@ -105,7 +197,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
   for (std::size_t i = 0; i < edges.size(); ++i) {
     S_0 += H[edges[i]] * prior.own()[i] * H[edges[i]].transpose();
     gains.push_back(m.with_edge[i] * inverse);
-    corrected.push_back({prior.own()[i], {}});
+    corrected.push_back({prior.own()[i], {}, false});
   }
   const bool alone = edges.size() == 1;
   if (alone) {
@@ -114,7 +206,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
     corrected[0].own =
         rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();
   }
-  SignedColumns observed(edges.size());
+  JointCovariance observed(edges.size());
   for (const JointPrior::Source& source : prior.sources()) {
     const Loading on_path = source.on_path(prior, H);
     std::vector<Loading> loadings = source.loadings;
@@ -140,7 +232,14 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
   }
   observed.append(less, true);
   if (!prior.sources().empty()) observed.append(more, false);
+  forget_least(prior, observed, corrected);
   observed.give(corrected, new_source);
+  for (CorrectedError& edge : corrected) {
+    if (!edge.forgotten) continue;
+    edge.common_errors.erase(
+        std::remove_if(edge.common_errors.begin(), edge.common_errors.end(), is_observed),
+        edge.common_errors.end());
+  }
   return corrected;
 }
 

@@ -11,6 +11,7 @@ namespace tfdude {
 struct CorrectedError {
   Matrix6d own;
   std::vector<CommonError> common_errors;
+  bool forgotten = false;  ///< how it was correlated with the others
 };
 
 /// The joint covariance after a measurement with error R, P - P Hᵀ S⁻¹ H P, as own parts and common
@@ -20,7 +21,7 @@ struct CorrectedError {
 /// loadings into F' = F - K C. The rest of the joint covariance is own - N S₀⁻¹ Nᵀ + (K S₀ - N)
 /// S₀⁻¹ (K S₀ - N)ᵀ. This gives two common errors of the new source: one that subtracts and, if
 /// there were common errors, one that adds. Common errors from earlier observations are merged into
-/// them.
+/// them. If fewer columns say the same (low_rank.hpp), those are taken.
 [[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
                                                            const std::vector<Matrix6d>& H,
                                                            const Matrix6d& R,

@@ -40,6 +40,11 @@ class JointPrior {
   [[nodiscard]] const std::vector<Matrix6d>& own() const { return own_; }
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
 
+  /// Whether an uncertain edge is not on the path.
+  [[nodiscard]] bool is_beside(std::size_t i) const {
+    return all_[edges_[i]].way == ObservedEdge::Way::kBeside;
+  }
+
   /// P_ii.
   [[nodiscard]] Matrix6d marginal(std::size_t i) const;
 

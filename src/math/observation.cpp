@@ -70,7 +70,7 @@ class Update {
     const Innovation innovation = innovation_of(m);
     Observation observation;
     judge(innovation, observation);
-    for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, {}});
+    for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, false, {}});
     if (independent_) note_innovation(m, innovation, observation);
     if (!observation.accepted) return observation;
     if (!independent_ && !weigh(m)) return observation;
@@ -221,6 +221,7 @@ class Update {
       for (CommonError& error : result.X_PC.common_errors)
         error.loading = (J * error.loading).eval();
       result.corrected = true;
+      result.forgotten = corrected[i].forgotten;
     }
   }
 
@@ -272,7 +273,7 @@ class Unspecified {
     }
     Observation found;
     compared_with_nothing(found);
-    for (const ObservedEdge& edge : edges_) found.edges.push_back({edge.X_PC, false, {}});
+    for (const ObservedEdge& edge : edges_) found.edges.push_back({edge.X_PC, false, false, {}});
     ObservedResult& result = found.edges[index_];
     result.corrected = true;
     (independent_ ? result.X_PC.own : result.X_PC.unknown.emplace()) = seen(from_path, S.matrix());

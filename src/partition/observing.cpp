@@ -29,35 +29,48 @@ std::vector<Edge> along(std::vector<FrameInfo> path, const std::string& a) {
   return edges;
 }
 
-// The answer that contains an edge, and its index there; edges must be visited in order.
-class Places {
- public:
-  explicit Places(const ObservePlan& plan) : plan_(plan), taken_(plan.parts.size(), 0) {}
-
-  struct Place {
-    std::size_t part;
-    std::size_t index;
-  };
-  Place next(const Edge& edge) {
-    const auto part = std::find_if(plan_.parts.begin(), plan_.parts.end(),
-                                   [&](const Part& one) { return one.owner == edge.info.owner; });
-    const auto i = static_cast<std::size_t>(part - plan_.parts.begin());
-    return {i, taken_[i]++};
+// Adds the edge to the part that asks its owner, and to the plan.
+Result<void> place(const Directory& directory, Edge edge, std::optional<Time> stamp,
+                   ObservePlan& plan) {
+  const bool beside = edge.way == Way::kBeside;
+  const auto first = plan.parts.begin() + static_cast<std::ptrdiff_t>(beside ? plan.path_parts : 0);
+  auto part = std::find_if(first, plan.parts.end(),
+                           [&](const Part& one) { return one.owner == edge.info.owner; });
+  if (part == plan.parts.end()) {
+    LookupRequest request;
+    if (!beside) request.query.at = stamp;
+    request.edges = true;
+    auto fresh = route_to(directory, edge.info.owner, Request{0, edge.info.id, std::move(request)});
+    if (!fresh) return tl::unexpected(std::move(fresh.error()));
+    plan.parts.push_back(*std::move(fresh));
+    part = std::prev(plan.parts.end());
   }
+  auto& segments = std::get<LookupRequest>(part->request.body).segments;
+  edge.part = static_cast<std::size_t>(part - plan.parts.begin());
+  edge.index = segments.size();
+  segments.push_back({edge.info.parent, edge.info.id});
+  plan.edges.push_back(std::move(edge));
+  return {};
+}
 
- private:
-  const ObservePlan& plan_;
-  std::vector<std::size_t> taken_;
-};
+// A dynamic edge is observed with itself: a later sample has another error.
+bool is_moving(const std::string& id, const PathCorrelation& correlation) {
+  const auto& with = correlation.observed_with;
+  return with.size() == 1 && with.front() == id;
+}
 
 // Whether an edge that this one was observed with does not depend on the source.
-bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belief& X,
-                  const std::vector<std::string>& observed_with) {
-  const auto source = std::find_if(X.common_errors.begin(), X.common_errors.end(), is_observed);
-  if (source == X.common_errors.end()) return false;
+bool lacks_source(const ObservePlan& plan, const ObservedPath& path, std::size_t edge) {
+  const auto& own = path.edges[edge].X_PC.common_errors;
+  const auto& with = path.correlations[edge].observed_with;
+  const auto source = std::find_if(own.begin(), own.end(), is_observed);
+  if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) {
+    return false;
+  }
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const std::string& id = plan.edges[k].info.id;
-    if (std::count(observed_with.begin(), observed_with.end(), id) == 0) continue;
+    if (std::count(with.begin(), with.end(), id) == 0) continue;
+    if (is_moving(id, path.correlations[k])) continue;
     const auto& common_errors = path.edges[k].X_PC.common_errors;
     const auto same = [&](const CommonError& common_error) {
       return common_error.source == source->source;
@@ -65,6 +78,46 @@ bool lacks_source(const ObservePlan& plan, const ObservedPath& path, const Belie
     if (std::none_of(common_errors.begin(), common_errors.end(), same)) return true;
   }
   return false;
+}
+
+// The request of the edge's owner, in which all its edges are revised at once.
+ReviseRequest& revision_of(const ObservePlan& plan, const ObservedPath& path, const Edge& edge,
+                           std::vector<Part>& parts) {
+  const Part& asked = plan.parts[edge.part];
+  const ObservedPath::Seen& seen = path.seen[edge.part];
+  auto part = std::find_if(parts.begin(), parts.end(),
+                           [&](const Part& one) { return one.owner == asked.owner; });
+  if (part == parts.end()) {
+    parts.push_back(asked);
+    part = std::prev(parts.end());
+    part->request.id = edge.info.id;  // an owner's filter checks it
+    part->request.body = ReviseRequest{{}, path.stamp, seen.commit, seen.incarnation};
+  }
+  auto& request = std::get<ReviseRequest>(part->request.body);
+  request.seen = std::min(request.seen, seen.commit);
+  return request;
+}
+
+const Edge& edge_of(const ObservePlan& plan, const std::string& id) {
+  return *std::find_if(plan.edges.begin(), plan.edges.end(),
+                       [&](const Edge& edge) { return edge.info.id == id; });
+}
+
+// Whether an owner has what a revision has made of an edge, up to the rounding of a lookup. Sources
+// have names that no other observation uses.
+bool is_same(const Belief& X, const Revision& revision) {
+  constexpr double kRounding = 1e-9;
+  const auto same_source = [](const CommonError& a, const CommonError& b) {
+    return a.source == b.source && a.subtracts == b.subtracts;
+  };
+  const auto& ours = revision.correlation.common_errors;
+  const auto& theirs = X.common_errors;
+  const Pose difference = X.pose.inverse() * revision.X_PC.pose;
+  const Matrix6d own = (X.unknown ? *X.unknown : X.own).matrix();
+  const Matrix6d revised = revision.X_PC.covariance.of_specified().matrix();
+  return std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end(), same_source) &&
+         log(difference).norm() <= kRounding * (1 + X.pose.translation().norm()) &&
+         (own - revised).norm() <= kRounding * revised.norm();
 }
 
 // The correlation that an owner stores for an observed edge.
@@ -89,31 +142,35 @@ Result<ObservePlan> route_observe(const Forest& forest, const Directory& directo
   if (path->empty()) {
     return fail(Errc::kInvalidInput, "there is no edge between " + quote(a) + " and itself");
   }
-  ObservePlan plan{along(*std::move(path), a), {}};
+  if (path->size() > kMaxCorrelated) {
+    return fail(Errc::kInvalidInput, "the path from " + quote(a) + " to " + quote(b) + " has " +
+                                         std::to_string(path->size()) + " edges; at most " +
+                                         std::to_string(kMaxCorrelated) +
+                                         " can be observed at once");
+  }
+  ObservePlan plan;
+  for (Edge& edge : along(*std::move(path), a)) {
+    auto ok = place(directory, std::move(edge), stamp, plan);
+    if (!ok) return tl::unexpected(std::move(ok.error()));
+  }
+  plan.path_parts = plan.parts.size();
   for (const std::string& id : beside) {
+    if (plan.edges.size() == kMaxCorrelated) break;
     auto info = forest.info(id);
-    if (info && !has(plan.edges, id)) plan.edges.push_back({*std::move(info), Way::kBeside});
-  }
-  for (const auto& [info, way] : plan.edges) {
-    const Owner owner = info.owner;
-    auto part = std::find_if(plan.parts.begin(), plan.parts.end(),
-                             [owner](const Part& one) { return one.owner == owner; });
-    if (part == plan.parts.end()) {
-      LookupRequest request;
-      request.query.at = stamp;
-      request.edges = true;
-      auto fresh = route_to(directory, owner, Request{0, info.id, std::move(request)});
-      if (!fresh) return tl::unexpected(std::move(fresh.error()));
-      plan.parts.push_back(*std::move(fresh));
-      part = std::prev(plan.parts.end());
+    // One whose owner cannot be asked keeps its value: the others are corrected without it.
+    if (info && !has(plan.edges, id)) {
+      (void)place(directory, {*std::move(info), Way::kBeside}, stamp, plan);
     }
-    std::get<LookupRequest>(part->request.body).segments.push_back({info.parent, info.id});
   }
-  if (plan.edges.size() <= kMaxCorrelated) return plan;
-  return fail(Errc::kInvalidInput, "the path from " + quote(a) + " to " + quote(b) +
-                                       " and the edges observed with it earlier are " +
-                                       std::to_string(plan.edges.size()) + " edges; at most " +
-                                       std::to_string(kMaxCorrelated) + " can be observed at once");
+  return plan;
+}
+
+std::vector<std::string> ObservePlan::beside(std::size_t part) const {
+  std::vector<std::string> ids;
+  for (const Edge& edge : edges) {
+    if (edge.part == part && edge.way == Way::kBeside) ids.push_back(edge.info.id);
+  }
+  return ids;
 }
 
 Result<ObservedPath> observed_path(const ObservePlan& plan,
@@ -128,14 +185,16 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
                                        " did not answer of all edges that it was asked for");
     }
     path.seen.push_back({answers[i].commit, answers[i].incarnation});
-    if (answers[i].stamp) path.stamp = answers[i].stamp;
+    if (i < plan.path_parts && answers[i].stamp) path.stamp = answers[i].stamp;
   }
-  Places places(plan);
-  std::vector<Places::Place> placed;
   for (const Edge& edge : plan.edges) {
-    const auto [part, index] = placed.emplace_back(places.next(edge));
-    const PathCorrelation& correlation = answers[part].correlations[index];
-    path.edges.push_back({belief_of(answers[part].values[index], correlation), edge.way});
+    const PathCorrelation& correlation = answers[edge.part].correlations[edge.index];
+    path.edges.push_back({belief_of(answers[edge.part].values[edge.index], correlation), edge.way});
+    path.correlations.push_back(correlation);
+    if (is_moving(edge.info.id, correlation)) {
+      if (edge.way == Way::kBeside) path.moving.push_back(edge.info.id);
+      continue;
+    }
     for (const std::string& id : correlation.observed_with) {
       const bool known =
           has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
@@ -143,9 +202,7 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
     }
   }
   for (std::size_t k = 0; k < plan.edges.size() && !path.torn; ++k) {
-    const auto& [part, index] = placed[k];
-    path.torn = lacks_source(plan, path, path.edges[k].X_PC,
-                             answers[part].correlations[index].observed_with);
+    path.torn = lacks_source(plan, path, k);
   }
   return path;
 }
@@ -154,36 +211,67 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
                             const Observation& observation) {
   std::vector<std::string> together;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
-    if (observation.edges[k].corrected) together.push_back(plan.edges[k].info.id);
+    const auto& [X_PC, corrected, forgotten, innovation] = observation.edges[k];
+    const std::string& id = plan.edges[k].info.id;
+    if (corrected && !forgotten && !is_moving(id, path.correlations[k])) together.push_back(id);
   }
-  std::vector<Part> parts = plan.parts;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    parts[i].request.body =
-        ReviseRequest{{}, path.stamp, path.seen[i].commit, path.seen[i].incarnation};
-  }
-  Places places(plan);
+  std::vector<Part> parts;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const ObservedResult& result = observation.edges[k];
-    const auto [part, index] = places.next(plan.edges[k]);
     if (!result.corrected && !(result.innovation.expected > 0)) continue;
-    ReviseRequest::Edge edge{plan.edges[k].info.id, result.innovation, !observation.accepted, {}};
+    const Edge& observed = plan.edges[k];
+    ReviseRequest::Edge edge{observed.info.id, result.innovation, !observation.accepted, {}};
     if (result.corrected) {
       const Belief& X = result.X_PC;
       edge.revision =
           Revision{edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(X, together)};
       edge.revision->X_PC.covariance.set_complete(!X.unspecified);
     }
-    std::get<ReviseRequest>(parts[part].request.body).edges.push_back(std::move(edge));
-  }
-  const auto idle = [](const Part& part) {
-    return std::get<ReviseRequest>(part.request.body).edges.empty();
-  };
-  parts.erase(std::remove_if(parts.begin(), parts.end(), idle), parts.end());
-  // An owner's filter checks the request's id.
-  for (Part& part : parts) {
-    part.request.id = std::get<ReviseRequest>(part.request.body).edges.front().id;
+    revision_of(plan, path, observed, parts).edges.push_back(std::move(edge));
   }
   return parts;
+}
+
+Part present_values(const ObservePlan& plan, const Part& revised) {
+  const auto& revise = std::get<ReviseRequest>(revised.request.body);
+  LookupRequest request;
+  request.query.at = revise.stamp;
+  request.edges = true;
+  Part part = revised;
+  for (const ReviseRequest::Edge& edge : revise.edges) {
+    if (edge.revision) request.segments.push_back({edge_of(plan, edge.id).info.parent, edge.id});
+  }
+  part.request.body = std::move(request);
+  return part;
+}
+
+std::optional<Part> taken_back(const ObservePlan& plan, const ObservedPath& path,
+                               const Part& revised, const SegmentValues& present) {
+  Part part = revised;
+  auto& revise = std::get<ReviseRequest>(part.request.body);
+  revise.seen = present.commit;
+  auto& edges = revise.edges;
+  edges.erase(std::remove_if(edges.begin(), edges.end(),
+                             [](const ReviseRequest::Edge& edge) { return !edge.revision; }),
+              edges.end());
+  if (present.values.size() != edges.size() || present.correlations.size() != edges.size() ||
+      present.incarnation != revise.incarnation) {
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    Revision& revision = *edges[i].revision;
+    if (!is_same(belief_of(present.values[i], present.correlations[i]), revision)) {
+      return std::nullopt;
+    }
+    const auto k = static_cast<std::size_t>(&edge_of(plan, revision.id) - plan.edges.data());
+    const Belief& X = path.edges[k].X_PC;
+    revision.X_PC = {X.pose, X.unknown ? *X.unknown : X.own};
+    revision.X_PC.covariance.set_complete(!X.unspecified);
+    revision.correlation = {X.unknown.has_value(), X.common_errors,
+                            path.correlations[k].observed_with};
+    edges[i].innovation = {};
+  }
+  return part;
 }
 
 }  // namespace tfdude

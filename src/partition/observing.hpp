@@ -18,14 +18,22 @@ struct ObservePlan {
   struct Edge {
     FrameInfo info;
     ObservedEdge::Way way;
+    std::size_t part = 0;   ///< that asks for it
+    std::size_t index = 0;  ///< there
   };
   std::vector<Edge> edges;  ///< those of the path in order, then those beside it
-  std::vector<Part> parts;  ///< a LookupRequest per owner, with its edges in that order
+  /// A LookupRequest per owner, with its edges of the path in that order, then those beside it.
+  std::vector<Part> parts;
+  std::size_t path_parts = 0;  ///< how many of them ask for edges of the path
+
+  [[nodiscard]] std::vector<std::string> beside(std::size_t part) const;
 };
 
-/// The plan with the values of all edges, at one instant.
+/// The plan with the values of all edges: those of the path at one instant, those beside it at any,
+/// since they are static.
 struct ObservedPath {
   std::vector<ObservedEdge> edges;
+  std::vector<PathCorrelation> correlations;  ///< as their owners store them
   struct Seen {
     std::uint64_t commit = 0;
     std::uint64_t incarnation = 0;
@@ -33,12 +41,14 @@ struct ObservedPath {
   std::vector<Seen> seen;  ///< by part
   std::optional<Time> stamp;
   std::vector<std::string> missing;  ///< edges beside the path that must be requested, too
+  std::vector<std::string> moving;   ///< edges beside the path that have become dynamic since
   /// An edge lacks the source of its joint observation with another one: another observation may be
   /// in progress.
   bool torn = false;
 };
 
-/// @param beside  edges observed together with some of the path; missing ones are left out
+/// @param beside  edges observed together with some of the path; those that are missing or cannot be
+///   asked are left out, as are those beyond kMaxCorrelated
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput (the path has no
 ///   edge, or too many).
 [[nodiscard]] Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,
@@ -54,5 +64,16 @@ struct ObservedPath {
 /// The parts of the owners: a ReviseRequest for each owner of an uncertain edge.
 [[nodiscard]] std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
                                           const Observation& observation);
+
+/// Asks an owner for the present values of the edges that a part has revised.
+[[nodiscard]] Part present_values(const ObservePlan& plan, const Part& revised);
+
+/// Takes a part of an observation back, if the owner still has what it wrote: gives its edges the
+/// values of before.
+/// @param revised  the part
+/// @param present  the owner's values (present_values())
+/// @return empty if there is something newer, whose author knows of the observation
+[[nodiscard]] std::optional<Part> taken_back(const ObservePlan& plan, const ObservedPath& path,
+                                             const Part& revised, const SegmentValues& present);
 
 }  // namespace tfdude

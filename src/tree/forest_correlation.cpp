@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/math/interpolate.hpp"
 
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
@@ -30,16 +31,43 @@ void Forest::Impl::set_correlation(HeldVersion& fresh,
 }
 
 void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
+  unlink(fresh);
   const Correlation& said = fresh.correlation->said;
   std::unique_ptr<EdgeCorrelation> correlation;
   if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
   set_correlation(fresh, std::move(correlation));
 }
 
+void Forest::Impl::unlink(const HeldVersion& edge) {
+  const std::string& id = edge.name->text;
+  for (const std::string& other : edge.correlation->now.observed_with) {
+    const auto slot = frames_.held_slot(other);
+    if (!slot || *slot == edge.slot) continue;
+    const HeldVersion& partner = frames_.newest_value(*slot);
+    if (partner.correlation == nullptr || !partner.correlation->revised) continue;
+    EdgeCorrelation left{partner.correlation->said, partner.correlation->now, true, 0};
+    auto& with = left.now.observed_with;
+    with.erase(std::remove(with.begin(), with.end(), id), with.end());
+    HeldVersion& fresh = push_held(*slot, partner.X_PC);
+    set_correlation(fresh, std::make_unique<EdgeCorrelation>(std::move(left)));
+  }
+}
+
+// What observations have found stays: the edge's error is no more certain because less is said of
+// its sources.
 void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) {
-  HeldVersion& fresh = push_held(slot, whole(frames_.newest_value(slot)));
+  HeldVersion& fresh = push_held(slot, frames_.newest_value(slot).X_PC);
   std::unique_ptr<EdgeCorrelation> correlation;
-  if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
+  const bool revised = fresh.correlation != nullptr && fresh.correlation->revised;
+  if (revised || !said.empty()) {
+    correlation.reset(new EdgeCorrelation{said, said, revised, 0});
+  }
+  if (revised) {
+    const Correlation& before = fresh.correlation->now;
+    correlation->now.observed_with = before.observed_with;
+    std::copy_if(before.common_errors.begin(), before.common_errors.end(),
+                 std::back_inserter(correlation->now.common_errors), is_observed);
+  }
   set_correlation(fresh, std::move(correlation));
 }
 
@@ -107,7 +135,40 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
   if (auto ok = check_ahead(edge, at); !ok) return ok;
   const std::uint64_t place = edge.samples->place_of(at);
   const bool there = place < edge.samples->next() && edge.samples->stamp(place) == at;
+  // The samples that the value at the instant was computed from.
+  for (const std::uint64_t number : {there ? place : place - 1, place}) {
+    if (number < edge.samples->oldest() || number >= edge.samples->next()) continue;
+    if (edge.samples->sample(number)->commit <= seen) continue;
+    return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
+  }
   return there ? Result<void>() : check_sample(edge, at);
+}
+
+void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
+                                 std::int64_t stamp) {
+  SampleRevision fresh{revision.X_PC, revision.correlation};
+  // Nothing else is correlated with it, once there are later samples.
+  fresh.correlation.observed_with.clear();
+  if (newest.samples != nullptr && newest.samples->count() > 0) {
+    const SampleHistory& samples = *newest.samples;
+    const std::uint64_t place = samples.place_of(stamp);
+    const Sample* after = place < samples.next() ? samples.sample(place) : nullptr;
+    const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
+    if (after != nullptr && after->stamp == stamp) {
+      fresh.given = given(*after);
+    } else if (after != nullptr && before != nullptr) {
+      const double s = static_cast<double>(stamp - before->stamp) /
+                       static_cast<double>(after->stamp - before->stamp);
+      interpolate(given(*before), given(*after), s, fresh.given);
+    }
+  }
+  const std::uint32_t slot = newest.slot;
+  replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp);
+  if (frames_.newest_value(slot).stamp != stamp) return;
+  HeldVersion& shown = push_held(slot, revision.X_PC);
+  const Correlation said = shown.correlation != nullptr ? shown.correlation->said : Correlation();
+  set_correlation(shown, std::unique_ptr<EdgeCorrelation>(
+                             new EdgeCorrelation{said, fresh.correlation, true, 0}));
 }
 
 void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& value,
@@ -123,6 +184,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
+  if (is_newest) end_revision(fresh);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
@@ -130,13 +192,6 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
     fresh.history = fresh.commit;
   }
   reclaimer_.supersede(superseded);
-}
-
-Transform Forest::Impl::whole(const Transform& X_PC, const Correlation& correlation) {
-  Belief observed = belief_of(X_PC, {});
-  std::copy_if(correlation.common_errors.begin(), correlation.common_errors.end(),
-               std::back_inserter(observed.common_errors), is_observed);
-  return collapse(observed);
 }
 
 Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
@@ -153,8 +208,7 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
     if (newest.moving() && stamp) {
-      const Transform X_PC = Impl::whole(edges[i].X_PC, edges[i].correlation);
-      impl_->replace_sample(newest, {X_PC}, nanoseconds(*stamp));
+      impl_->revise_sample(newest, edges[i], nanoseconds(*stamp));
       continue;
     }
     const Correlation said =

@@ -50,6 +50,7 @@ void Forest::Impl::begin_history(const HeldVersion& newest, const GivenValue& va
                                  std::int64_t stamp) {
   HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   forget_history(fresh);
+  end_revision(fresh);
   append_to(fresh, value, stamp);
 }
 

@@ -7,6 +7,7 @@
 #include "tree/oldest_samples.hpp"
 #include "tree/path_lookup.hpp"
 #include "tree/reclaimer.hpp"
+#include "tree/revised_sample.hpp"
 #include "tree/sample_rules.hpp"
 #include "tree/stamp_clock.hpp"
 #include "tree/write_lock.hpp"
@@ -137,17 +138,22 @@ class Forest::Impl {
     if (fresh.correlation != nullptr && fresh.correlation->revised) correlate_as_said(fresh);
   }
   void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
+  /// The edges that were observed with this one are not correlated with its next value.
+  void unlink(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
+  /// Corrects a dynamic edge at an instant.
+  void revise_sample(const HeldVersion& newest, const Revision& revision, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
   /// Pushes the newest value again, with another correlation.
   void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen)
       TFDUDE_REQUIRES(mutex_);
-  /// The value with the whole covariance of an edge, except for common errors of declared sources.
-  /// Stored for an observed edge if the common errors of observations are not.
-  [[nodiscard]] static Transform whole(const Transform& X_PC, const Correlation& correlation);
+  /// The newest value with all of its covariance, except for what is said of it: what remains of it
+  /// if the common errors of observations are left out.
   [[nodiscard]] static Transform whole(const HeldVersion& edge) {
-    const bool observed = edge.correlation != nullptr && edge.correlation->revised;
-    return observed ? whole(edge.X_PC, edge.correlation->now) : edge.X_PC;
+    const EdgeCorrelation* correlation = edge.correlation;
+    const bool observed = correlation != nullptr && correlation->revised;
+    return observed ? tfdude::whole(edge.X_PC, correlation->now, &correlation->said) : edge.X_PC;
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// Replaces the dynamic edge's sample with that stamp, if there is one.

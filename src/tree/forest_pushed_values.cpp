@@ -49,8 +49,21 @@ HistoryInfo history_of(const HeldVersion& edge) {
   return info;
 }
 
+// Watchers know correlations of edges, not of single samples: of a sample that was observed, they
+// get all of its covariance.
 Correlation correlation_of(const HeldVersion& edge) {
-  return edge.correlation != nullptr ? edge.correlation->now : Correlation();
+  if (edge.correlation == nullptr) return {};
+  return edge.moving() ? edge.correlation->said : edge.correlation->now;
+}
+
+Transform newest_of(const HeldVersion& edge) {
+  const EdgeCorrelation* correlation = edge.correlation;
+  if (!edge.moving() || correlation == nullptr || !correlation->revised) return edge.X_PC;
+  return whole(edge.X_PC, correlation->now, &correlation->said);
+}
+
+Transform value_of(const HeldVersion& edge, const Sample& sample) {
+  return whole(sample, edge.correlation != nullptr ? &edge.correlation->said : nullptr);
 }
 
 // The number of the first sample to report, up to the edge's newest.
@@ -117,7 +130,7 @@ void Telling::tell_newest(std::uint64_t seen) {
   const SampleHistory& samples = *edge_.samples;
   const Sample* newest = samples.sample(edge_.number);
   if (newest != nullptr && newest->commit <= seen) return;
-  tell(time_of(edge_.stamp), edge_.X_PC);
+  tell(time_of(edge_.stamp), newest_of(edge_));
   if (seen == 0 || newest == nullptr) return;
   const Sample* before = newest;
   for (std::uint64_t number = edge_.number; before != nullptr && before->commit > seen; --number) {
@@ -137,11 +150,12 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
     if (before != nullptr && (is_new(*sample) || is_new(*before))) tell_between(*before, *sample);
     if (is_new(*sample)) {
       // The edge's version may be newer than the sample that it shows.
-      tell(time_of(sample->stamp), number == edge_.number ? edge_.X_PC : sample->value());
+      tell(time_of(sample->stamp),
+           number == edge_.number ? newest_of(edge_) : value_of(edge_, *sample));
     }
     before = sample;
   }
-  if (samples.sample(edge_.number) == nullptr) tell(time_of(edge_.stamp), edge_.X_PC);
+  if (samples.sample(edge_.number) == nullptr) tell(time_of(edge_.stamp), newest_of(edge_));
 }
 
 void Telling::tell_no_sample(std::uint64_t seen) {

@@ -172,7 +172,8 @@ SegmentValues values_of(const std::vector<Ends>& segments, std::vector<Reached>&
   return found;
 }
 
-// Adds the edges that each single edge was observed with.
+// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself: what
+// was observed is its sample, and a later one has another error.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
@@ -181,8 +182,12 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   found.correlations.resize(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion* edge = edge_of(edges[i]);
-    if (edge == nullptr || edge->correlation == nullptr) continue;
-    found.correlations[i].observed_with = edge->correlation->now.observed_with;
+    if (edge == nullptr) continue;
+    if (edge->moving() && !edge->unsampled()) {
+      found.correlations[i].observed_with = {edge->name->text};
+    } else if (edge->correlation != nullptr) {
+      found.correlations[i].observed_with = edge->correlation->now.observed_with;
+    }
   }
 }
 

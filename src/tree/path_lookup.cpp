@@ -12,6 +12,7 @@
 #include "math/path_accumulation.hpp"
 #include "tree/epoch.hpp"
 #include "tree/no_data.hpp"
+#include "tree/revised_sample.hpp"
 #include "tree/unspecified_edges.hpp"
 
 namespace tfdude {
@@ -53,21 +54,37 @@ void add_noise(Transform& X, const HeldVersion& edge, double seconds) {
 // The text is added by explained(), where all edges are known.
 tl::unexpected<Error> no_data(Errc code) { return fail(code, {}); }
 
-// Extrapolates beyond the newest sample, up to the allowed limit.
-template <class Value>
-Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query& query,
-                            OfEdge<Value>& X) {
+// Two samples that an instant is extrapolated from.
+struct Newest {
+  const Sample* before = nullptr;
+  const Sample* newest = nullptr;
+};
+
+// Those of the edge, if it may be extrapolated so far.
+Result<Newest> newest_of(const HeldVersion& edge, std::int64_t t, const Query& query) {
   if (edge.lacks_sample()) return no_data(Errc::kNotYet);
-  const std::int64_t beyond = t - edge.stamp;
-  if (beyond > query.extrapolate.count()) return no_data(Errc::kNotYet);
-  const Sample* before =
-      edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
-  const Sample* newest = edge.samples->sample(edge.number);
-  if (before == nullptr || newest == nullptr) return no_data(Errc::kNotYet);
-  const double s = seconds(t - before->stamp) / seconds(edge.stamp - before->stamp);
-  extrapolate(*before, *newest, value_of<Value>(edge), s, X);
-  add_noise(X, edge, seconds(beyond));
-  return {};
+  if (t - edge.stamp > query.extrapolate.count()) return no_data(Errc::kNotYet);
+  const Newest found{
+      edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr,
+      edge.samples->sample(edge.number)};
+  if (found.before == nullptr || found.newest == nullptr) return no_data(Errc::kNotYet);
+  return found;
+}
+
+const Correlation* said_of(const HeldVersion& edge) {
+  return edge.correlation != nullptr ? &edge.correlation->said : nullptr;
+}
+
+// How the error of the edge that is accumulated next is correlated.
+template <class Value>
+void correlate_next(PathAccumulation<Value>& path, const Correlation* correlation) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    if (correlation == nullptr) {
+      path.correlate_next(false, nullptr);
+    } else {
+      path.correlate_next(correlation->unknown, &correlation->common_errors);
+    }
+  }
 }
 
 // The instant of a walk.
@@ -75,9 +92,40 @@ struct Moment {
   std::int64_t t;
   std::int64_t age;  // adds the process noise until then
   const Query& query;
-  bool common;             // as of PathLookup::Instant
-  std::uint64_t back = 0;  // see SampleHistory::around()
+  bool common;              // as of PathLookup::Instant
+  std::uint64_t back = 0;   // see SampleHistory::around()
+  bool correlated = false;  // a sample has a correlation of its own
 };
+
+// Accumulates an edge beyond its newest sample.
+template <class Value>
+Result<void> accumulate_beyond(PathAccumulation<Value>& path, const HeldVersion& edge,
+                               Moment& moment) {
+  const auto found = newest_of(edge, moment.t, moment.query);
+  if (!found) return tl::unexpected(found.error());
+  const auto [before, newest] = *found;
+  const double span = seconds(edge.stamp - before->stamp);
+  const double beyond = seconds(moment.t - edge.stamp);
+  const double s = 1.0 + beyond / span;
+  const bool revised = before->revision() != nullptr || newest->revision() != nullptr;
+  moment.correlated = moment.correlated || revised;
+  // A random walk of this density has also moved the sample before, by which the twist is wrong.
+  const double noise = beyond * s + seconds(moment.age);
+  if constexpr (std::is_same_v<Value, Belief>) {
+    if (revised || said_of(edge) != nullptr) {
+      CorrelatedValue ahead = extrapolate_correlated(*before, *newest, edge.X_PC, s, said_of(edge));
+      add_noise(ahead.X_PC, edge, noise);
+      correlate_next(path, &ahead.correlation);
+      path.up(ahead.X_PC);
+      return {};
+    }
+  }
+  OfEdge<Value>& X = path.place();
+  extrapolate(*before, *newest, value_of<Value>(edge), s, X);
+  add_noise(X, edge, noise);
+  path.up(X);
+  return {};
+}
 
 // Accumulates an edge whose instant is that of a sample, with this value.
 template <class Value>
@@ -93,19 +141,31 @@ void accumulate_sample(PathAccumulation<Value>& path, const HeldVersion& edge,
 // Accumulates an edge between two samples.
 template <class Value>
 void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
-                        const SampleHistory::Bracket& samples, const Moment& moment) {
+                        const SampleHistory::Bracket& samples, Moment& moment) {
   const Sample& before = *samples.before;
   const Sample& after = *samples.after;
   const auto span = static_cast<double>(after.stamp - before.stamp);
   const double s = static_cast<double>(moment.t - before.stamp) / span;
   const bool noisy = edge.samples->has_noise();
+  const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
+  if (before.revision() != nullptr || after.revision() != nullptr) {
+    moment.correlated = true;
+    if constexpr (std::is_same_v<Value, Belief>) {
+      CorrelatedValue value = interpolate_observed(before, after, s, said_of(edge));
+      if (noisy) add_noise(value.X_PC, edge, noise);
+      correlate_next(path, &value.correlation);
+      path.up(value.X_PC);
+      return;
+    }
+  }
+  correlate_next(path, said_of(edge));
   if (!noisy && before.joint() == nullptr && after.joint() == nullptr) {
     path.up_between(before.parts(), after.parts(), s);
     return;
   }
   OfEdge<Value>& X = path.place();
   interpolate(before, after, s, X);
-  if (noisy) add_noise(X, edge, seconds(moment.age) + s * (1.0 - s) * span * 1e-9);
+  if (noisy) add_noise(X, edge, noise);
   path.up(X);
 }
 
@@ -118,12 +178,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
       path.up(value_of<Value>(edge));
       return {};
     }
-    OfEdge<Value>& X = path.place();
-    auto computed = compute_beyond<Value>(edge, t, moment.query, X);
-    if (!computed) return computed;
-    if (moment.age != 0) add_noise(X, edge, seconds(moment.age));
-    path.up(X);
-    return {};
+    return accumulate_beyond(path, edge, moment);
   }
   if (t == edge.stamp) {
     accumulate_sample(path, edge, value_of<Value>(edge), moment.age);
@@ -132,6 +187,8 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
   const auto found = edge.samples->around(t, edge.number, moment.back);
   if (found.before == nullptr) return no_data(Errc::kTooOld);
   if (t == found.before->stamp) {
+    moment.correlated = moment.correlated || found.before->revision() != nullptr;
+    correlate_next(path, correlation_at(*found.before, said_of(edge)));
     OfEdge<Value>& X = path.place();
     X = value_of<Value>(*found.before);
     accumulate_sample(path, edge, X, moment.age);
@@ -139,14 +196,6 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
     accumulate_between(path, edge, found, moment);
   }
   return {};
-}
-
-void tie(PathAccumulation<Belief>& path, const HeldVersion& edge) {
-  if (edge.correlation == nullptr) {
-    path.correlate_next(false, nullptr);
-  } else {
-    path.correlate_next(edge.correlation->now.unknown, &edge.correlation->now.common_errors);
-  }
 }
 
 template <class Value>
@@ -184,7 +233,7 @@ Result<void> PathLookup::walk(const Ends& ends, Absent absent, Order order, Take
     } else if (!error) {
       const auto& edge = static_cast<const HeldVersion&>(*here);
       PathAccumulation<Value>& path = from_a ? path_a : path_b;
-      if constexpr (std::is_same_v<Value, Belief>) tie(path, edge);
+      correlate_next(path, edge.correlation != nullptr ? &edge.correlation->now : nullptr);
       Result<void> taken = take(path, edge);
       if (!taken) error = std::move(taken.error());
     }
@@ -244,7 +293,9 @@ Result<void> PathLookup::walk_at(const Ends& ends, Absent absent, const Instant&
     if (leaves_out_correlation<Value>(edge)) met.correlated = true;
     if (edge.moving()) {
       met.moving = true;
-      return accumulate_at<Value>(path, edge, moment);
+      Result<void> taken = accumulate_at<Value>(path, edge, moment);
+      met.correlated = met.correlated || (std::is_same_v<Value, Transform> && moment.correlated);
+      return taken;
     }
     if (!met.correlated) path.up(value_of<Value>(edge));
     return {};

@@ -3,9 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "tfdude/math/transform.hpp"
+#include "tfdude/types/correlation.hpp"
 
 #include "math/joint_state.hpp"
 #include "math/path_accumulation.hpp"
@@ -27,12 +29,22 @@ inline constexpr std::int64_t kNoSample = kAlways + 2;
 struct SharedPart {
   std::uint32_t samples = 0;  ///< that share it; for the writer only
   bool is_joint = false;
+  bool is_revised = false;  ///< an observation has made it
+};
+
+/// What an observation has made of a sample: its error is one row of the joint covariance of all
+/// that was observed then (a delayed state), while the samples around it stay as they were given.
+struct SampleRevision {
+  Transform given;          ///< the sample before all observations
+  Correlation correlation;  ///< of this sample, instead of what is said of the edge
 };
 
 /// Three cache lines.
 struct alignas(64) SharedCovariance : SharedPart {
   StatedCovariance covariance;
+  std::unique_ptr<const SampleRevision> revision;  ///< null: as given
 };
+static_assert(sizeof(SharedCovariance) == 192);
 
 struct SharedJoint : SharedPart {
   PreparedJoint joint;
@@ -41,7 +53,8 @@ struct SharedJoint : SharedPart {
 /// A new value of an edge.
 struct GivenValue {
   const Transform& X_PC;
-  const JointState* state = nullptr;  ///< if a joint gives it
+  const JointState* state = nullptr;         ///< if a joint gives it
+  const SampleRevision* revision = nullptr;  ///< if an observation does
 };
 
 /// A sample of an edge: a pose, or the position of a joint. Immutable once its commit is visible.
@@ -71,6 +84,11 @@ class Sample {
     return static_cast<const SharedCovariance*>(shared)->covariance;
   }
   [[nodiscard]] TransformParts parts() const { return {&pose(), &covariance()}; }
+  /// Null: it is as it was given.
+  [[nodiscard]] const SampleRevision* revision() const {
+    if (!shared->is_revised) return nullptr;
+    return static_cast<const SharedCovariance*>(shared)->revision.get();
+  }
 
   [[nodiscard]] Transform value() const;
   [[nodiscard]] Pose value_pose() const;

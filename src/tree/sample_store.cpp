@@ -28,7 +28,9 @@ bool same(const T& a, const T& b) {
 bool is_shared(const GivenValue& value, const SharedPart& part) {
   if (part.is_joint != (value.state != nullptr)) return false;
   if (!part.is_joint) {
-    return same(value.X_PC.covariance, static_cast<const SharedCovariance&>(part).covariance);
+    const auto& of_part = static_cast<const SharedCovariance&>(part);
+    const bool revised = value.revision != nullptr || part.is_revised;
+    return !revised && same(value.X_PC.covariance, of_part.covariance);
   }
   const Joint& joint = *value.state->joint;
   const PreparedJoint& prepared = static_cast<const SharedJoint&>(part).joint;
@@ -60,7 +62,9 @@ const SharedPart* SampleStore::fresh_part(const GivenValue& value) {
   if (value.state == nullptr) {
     SharedCovariance* part = covariances_.take();
     part->covariance = value.X_PC.covariance;
-    bytes_ += sizeof(*part);
+    part->is_revised = value.revision != nullptr;
+    part->revision.reset(value.revision != nullptr ? new SampleRevision(*value.revision) : nullptr);
+    bytes_ += bytes_of(*part);
     return part;
   }
   SharedJoint* part = joints_.take();

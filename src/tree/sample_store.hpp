@@ -56,7 +56,14 @@ class SampleStore {
 
 /// The memory of a part that samples share.
 [[nodiscard]] inline std::size_t bytes_of(const SharedPart& shared) {
-  return shared.is_joint ? sizeof(SharedJoint) : sizeof(SharedCovariance);
+  if (shared.is_joint) return sizeof(SharedJoint);
+  const SampleRevision* revision = static_cast<const SharedCovariance&>(shared).revision.get();
+  if (revision == nullptr) return sizeof(SharedCovariance);
+  std::size_t bytes = sizeof(SharedCovariance) + sizeof(SampleRevision);
+  for (const CommonError& one : revision->correlation.common_errors) {
+    bytes += sizeof(one) + static_cast<std::size_t>(one.loading.size()) * sizeof(double);
+  }
+  return bytes;
 }
 
 }  // namespace tfdude

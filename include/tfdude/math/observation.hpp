@@ -41,10 +41,16 @@ struct NormalizedInnovation {
   double variance = 0;  ///< of `squares`, if the covariances are right
 };
 
+/// Maximum number of edges whose errors stay correlated after an observation.
+inline constexpr std::size_t kMaxObservedTogether = 112;
+
 /// An edge after an observation.
 struct ObservedResult {
   Belief X_PC;
   bool corrected = false;  ///< false: unchanged
+  /// More than kMaxObservedTogether edges are correlated. This one is among the least correlated
+  /// with the path: its error now counts as independent of the others.
+  bool forgotten = false;
   NormalizedInnovation innovation;
 };
 
@@ -66,8 +72,9 @@ struct Observation {
 /// replaces those of earlier observations. So it is exact to first order for every path, and a
 /// second observation does not treat the edges' errors as independent. Common errors of other
 /// sources are kept as in a Schmidt-Kalman filter: what other edges hold of such a source need not
-/// change. A single uncertain edge takes all of the correction, and needs no new source. Columns
-/// beyond the maximum of a loading are dropped in such a way that no covariance becomes too small.
+/// change. A single uncertain edge takes all of the correction, and needs no new source. The
+/// columns are as few as the correlation allows; beyond 144 they are dropped in such a way that no
+/// covariance becomes too small. At most kMaxObservedTogether edges stay correlated.
 ///
 /// Parts of unknown correlation count as part of the measurement's error, which is then not
 /// independent of the rest. If such an edge is the only uncertain one, it is corrected by

@@ -74,6 +74,9 @@ struct Observed {
   double limit = 0;    ///< of the gate
   bool accepted = false;
   std::vector<std::string> corrected;  ///< edges whose values have changed
+  /// Edges that were correlated with those of the path, and are not any more: too many were
+  /// (kMaxObservedTogether), and these the least.
+  std::vector<std::string> forgotten;
   std::optional<Time> stamp;           ///< of the corrected dynamic edges
 };
 

@@ -23,6 +23,7 @@ using testing::Random;
 
 constexpr int kRuns = 1000;
 constexpr auto kDown = ObservedEdge::Way::kDown;
+constexpr auto kBeside = ObservedEdge::Way::kBeside;
 constexpr auto kUp = ObservedEdge::Way::kUp;
 const std::string kSource = "observed:once";
 
@@ -133,13 +134,51 @@ TEST_CASE("The joint covariance equals that of a dense filter") {
   }
 }
 
+TEST_CASE("One edge seen by many others stays exact with six columns") {
+  Random random(641);
+  INFO("seed " << random.seed());
+  // The error of a mount, and of forty sensors on it, each of which is measured in the mount's
+  // parent once.
+  std::vector<ObservedEdge> edges(41);
+  const Covariance wide = *Covariance::from_stddev({0.02, 0.02, 0.02, 0.02, 0.02, 0.02});
+  const Covariance narrow = *Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3});
+  for (ObservedEdge& edge : edges) {
+    edge.X_PC = {random.pose(), wide, std::nullopt, {}};
+    edge.way = kBeside;
+  }
+  for (std::size_t sensor = 1; sensor < edges.size(); ++sensor) {
+    std::vector<ObservedEdge> all{edges[0], edges[sensor]};
+    all[0].way = all[1].way = kDown;
+    for (std::size_t other = 1; other < sensor; ++other) all.push_back(edges[other]);
+    const Pose Z = all[0].X_PC.pose * all[1].X_PC.pose;
+    const auto found = observe(all, {Z, narrow}, "observed:" + std::to_string(sensor), {1.0, true});
+    REQUIRE(found);
+    edges[0].X_PC = found->edges[0].X_PC;
+    edges[sensor].X_PC = found->edges[1].X_PC;
+    for (std::size_t other = 1; other < sensor; ++other) {
+      edges[other].X_PC = found->edges[1 + other].X_PC;
+    }
+  }
+  for (std::size_t sensor = 1; sensor < edges.size(); ++sensor) {
+    const Belief path = compose(edges[0].X_PC, edges[sensor].X_PC, Order::kSecond);
+    const Twist variances = collapse(path).covariance.of_specified().matrix().diagonal();
+    INFO("sensor " << sensor);
+    // R, as the path was known so much less before.
+    CHECK(variances.maxCoeff() < 1.0001e-6);
+    CHECK(variances.minCoeff() > 0.99e-6);
+    Eigen::Index columns = 0;
+    for (const CommonError& one : edges[sensor].X_PC.common_errors) columns += one.loading.cols();
+    CHECK(columns <= 12);
+  }
+}
+
 TEST_CASE("Columns that are dropped make the joint covariance larger and never smaller") {
   Random random(640);
   INFO("seed " << random.seed());
-  ObservedChain chain(random, 9);
+  ObservedChain chain(random, 40);
   Eigen::MatrixXd P = chain.dense();
-  for (int i = 0; i < 30; ++i) {
-    const Ends ends{random.index(5), 5 + random.index(5)};
+  for (int i = 0; i < 40; ++i) {
+    const Ends ends{random.index(20), 20 + random.index(20)};
     const Covariance R = random.covariance(0.003, 0.003);
     P = chain.dense_update(P, ends.from, ends.to, R);
     chain.observe_exactly(ends.from, ends.to, R);

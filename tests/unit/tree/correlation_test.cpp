@@ -207,7 +207,7 @@ TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with it
   }
   const Transform X = random.transform();
   for (const auto stamp : {at(190ms), at(50ms), at(55ms), at(195ms)}) {
-    REQUIRE(robot.forest.revise({{"a", X, {}}}, stamp, 0));
+    REQUIRE(robot.forest.revise({{"a", X, {}}}, stamp, UINT64_MAX));
     Query query;
     query.at = stamp;
     const auto found = robot.forest.lookup("world", "a", query);

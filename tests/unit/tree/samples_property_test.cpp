@@ -26,7 +26,8 @@ using testing::transform_diff;
 struct Full {
   std::int64_t stamp = 0;
   Transform X;
-  JointState state{};  // of a position
+  JointState state{};                // of a position
+  std::optional<Transform> given{};  // before it was revised
 };
 
 Transform joint_value(const JointState& state) {
@@ -51,7 +52,9 @@ class Reference {
   void replace(const Full& sample) {
     const auto at = place(sample.stamp);
     if (at != all_.end() && at->stamp == sample.stamp) {
+      const Transform given = at->given.value_or(at->X);
       *at = sample;
+      at->given = given;
     } else {
       (void)add(sample);
     }
@@ -80,7 +83,16 @@ class Reference {
           outside ? extrapolate(start, b.state.at, s, 0) : interpolate(start, b.state.at, s, 0);
       return joint_value({a.state.joint, q});
     }
-    return outside ? extrapolate(a.X, b.X, s) : interpolate(a.X, b.X, s);
+    if (!outside) return interpolate(a.X, b.X, s);
+    if (!a.given && !b.given) return extrapolate(a.X, b.X, s);
+    // What an observation has found is an offset: the twist is that of the given samples.
+    const Transform X0 = a.given.value_or(a.X);
+    const Transform X1 = b.given.value_or(b.X);
+    const Pose ahead = exp((s - 1) * log(X0.pose.inverse() * X1.pose));
+    const Covariance of_twist = bound(X0.covariance.of_specified(), X1.covariance.of_specified());
+    return Transform{b.X.pose * ahead,
+                     bound(b.X.covariance.of_specified().transported(ahead.inverse()),
+                           Covariance::trusted(Matrix6d((s - 1) * (s - 1) * of_twist.matrix())))};
   }
 
  private:
@@ -207,7 +219,7 @@ class Edge {
     return {stamp, joint_value(state), state};
   }
   void revise(const Full& sample) {
-    REQUIRE(forest_.revise({{"edge", sample.X, {}}}, time_of(sample.stamp), 0));
+    REQUIRE(forest_.revise({{"edge", sample.X, {}}}, time_of(sample.stamp), UINT64_MAX));
     reference_.replace(sample);
   }
 

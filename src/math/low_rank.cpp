@@ -1,0 +1,116 @@
+#include "math/low_rank.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+namespace tfdude {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+using Block = Eigen::Matrix<double, 6, 6>;
+using Vector = Eigen::Matrix<double, 6, 1>;
+
+constexpr Eigen::Index kSize = 6;
+
+// The correlation that counts as none.
+constexpr double kNone = 1e-9;
+
+// Eigenvalues of a correlation matrix below this are zero.
+constexpr double kSingular = 1e-12;
+
+// Coordinates of a block in which its covariance is one, or zero where it is known exactly. Scaled
+// to correlations first, as metres and radians differ.
+struct White {
+  Block to;    // W A Wᵀ = 1
+  Block from;  // its pseudo-inverse
+};
+
+White white(const Block& A) {
+  Vector scale = A.diagonal().cwiseMax(0.0).cwiseSqrt();
+  for (double& one : scale) one = one > 0 ? one : 1.0;
+  const Vector per = scale.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Block> solver(per.asDiagonal() * A * per.asDiagonal());
+  const Vector roots = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Vector inverse_roots = solver.eigenvalues().unaryExpr(
+      [](double value) { return value > kSingular ? 1.0 / std::sqrt(value) : 0.0; });
+  return {inverse_roots.asDiagonal() * solver.eigenvectors().transpose() * per.asDiagonal(),
+          scale.asDiagonal() * solver.eigenvectors() * roots.asDiagonal()};
+}
+
+class Hubs {
+ public:
+  Hubs(Matrix P, const Eigen::VectorXd& rounding)
+      : P_(std::move(P)), n_(P_.rows() / kSize), least_(n_) {
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      white_.push_back(white(P_.block<6, 6>(kSize * i, kSize * i)));
+      const Block& W = white_.back().to;
+      P_.middleRows(kSize * i, kSize) = (W * P_.middleRows(kSize * i, kSize)).eval();
+      P_.middleCols(kSize * i, kSize) = (P_.middleCols(kSize * i, kSize) * W.transpose()).eval();
+      const Block rounded = W * rounding.segment(kSize * i, kSize).asDiagonal();
+      least_[i] = std::max(std::sqrt(kNone), rounded.norm());
+    }
+  }
+
+  std::optional<BlocksAndColumns> run(Eigen::Index most_columns) {
+    Matrix F(P_.rows(), 0);
+    while (const auto hub = next()) {
+      const Eigen::SelfAdjointEigenSolver<Block> solver(P_.block<6, 6>(kSize * *hub, kSize * *hub));
+      const Matrix with_others = P_.middleCols(kSize * *hub, kSize);
+      for (Eigen::Index k = 0; k < kSize; ++k) {
+        const double value = solver.eigenvalues()[k];
+        if (value <= kSingular) continue;
+        if (F.cols() == most_columns) return std::nullopt;
+        F.conservativeResize(Eigen::NoChange, F.cols() + 1);
+        F.rightCols(1) = with_others * solver.eigenvectors().col(k) / std::sqrt(value);
+        P_.noalias() -= F.rightCols(1) * F.rightCols(1).transpose();
+      }
+      P_.middleRows(kSize * *hub, kSize).setZero();
+      P_.middleCols(kSize * *hub, kSize).setZero();
+    }
+    BlocksAndColumns found{Matrix(P_.rows(), kSize), std::move(F)};
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      const Block& from = white_[static_cast<std::size_t>(i)].from;
+      found.own.middleRows(kSize * i, kSize) =
+          from * P_.block<6, 6>(kSize * i, kSize * i) * from.transpose();
+      found.F.middleRows(kSize * i, kSize) = (from * found.F.middleRows(kSize * i, kSize)).eval();
+    }
+    return found;
+  }
+
+ private:
+  // The block with the most correlation with others; empty if there is none left.
+  [[nodiscard]] std::optional<Eigen::Index> next() const {
+    std::optional<Eigen::Index> hub;
+    double most = 0;
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      double sum = 0;
+      for (Eigen::Index j = 0; j < n_; ++j) {
+        if (j == i) continue;
+        const auto both = P_.block<6, 6>(kSize * i, kSize * j);
+        if (both.cwiseAbs().maxCoeff() > least_[i] * least_[j]) sum += both.squaredNorm();
+      }
+      if (sum <= most) continue;
+      most = sum;
+      hub = i;
+    }
+    return hub;
+  }
+
+  Matrix P_;  // in white coordinates
+  const Eigen::Index n_;
+  std::vector<White> white_;
+  Eigen::VectorXd least_;
+};
+
+}  // namespace
+
+std::optional<BlocksAndColumns> by_hubs(Matrix P, const Eigen::VectorXd& rounding,
+                                        Eigen::Index most_columns) {
+  return Hubs(std::move(P), rounding).run(most_columns);
+}
+
+}  // namespace tfdude

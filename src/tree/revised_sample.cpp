@@ -1,0 +1,124 @@
+#include "tree/revised_sample.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "tfdude/math/interpolate.hpp"
+#include "tfdude/math/perturbation.hpp"
+
+#include "math/common_errors.hpp"
+#include "math/semidefinite.hpp"
+
+namespace tfdude {
+namespace {
+
+Belief belief_of(const Sample& sample, const Correlation* said) {
+  const Transform X = sample.value();
+  Belief belief;
+  belief.pose = X.pose;
+  belief.own = X.covariance.of_specified();
+  belief.unspecified = !X.covariance.complete();
+  const Correlation* correlation = correlation_at(sample, said);
+  if (correlation == nullptr) return belief;
+  belief.common_errors = correlation->common_errors;
+  if (correlation->unknown) belief.unknown = std::exchange(belief.own, {});
+  return belief;
+}
+
+bool is_unknown(const Sample& sample, const Correlation* said) {
+  const Correlation* correlation = correlation_at(sample, said);
+  return correlation != nullptr && correlation->unknown;
+}
+
+std::vector<CommonError> times(const Matrix6d& factor, std::vector<CommonError> common_errors) {
+  for (CommonError& one : common_errors) one.loading = (factor * one.loading).eval();
+  return common_errors;
+}
+
+// The covariance of X is that of the whole error, of which the common errors are a part.
+CorrelatedValue split(Transform X, std::vector<CommonError> common_errors, bool unknown) {
+  Matrix6d own = X.covariance.of_specified().matrix();
+  for (const CommonError& one : common_errors) {
+    own -= (one.subtracts ? -1.0 : 1.0) * one.loading * one.loading.transpose();
+  }
+  const bool complete = X.covariance.complete();
+  X.covariance = Covariance::trusted(nearest_semidefinite(own));
+  X.covariance.set_complete(complete);
+  return {X, {unknown, std::move(common_errors), {}}};
+}
+
+}  // namespace
+
+const Correlation* correlation_at(const Sample& sample, const Correlation* said) {
+  const SampleRevision* revision = sample.revision();
+  return revision != nullptr ? &revision->correlation : said;
+}
+
+Transform whole(const Transform& X_PC, const Correlation& now, const Correlation* said) {
+  Belief all;
+  all.pose = X_PC.pose;
+  all.own = X_PC.covariance.of_specified();
+  all.unspecified = !X_PC.covariance.complete();
+  const auto is_said = [&](const CommonError& one) {
+    return said != nullptr &&
+           std::count(said->common_errors.begin(), said->common_errors.end(), one) > 0;
+  };
+  std::copy_if(now.common_errors.begin(), now.common_errors.end(),
+               std::back_inserter(all.common_errors),
+               [&](const CommonError& one) { return !is_said(one); });
+  return collapse(all);
+}
+
+Transform whole(const Sample& sample, const Correlation* said) {
+  const SampleRevision* revision = sample.revision();
+  const Transform X = sample.value();
+  return revision != nullptr ? whole(X, revision->correlation, said) : X;
+}
+
+Transform given(const Sample& sample) {
+  const SampleRevision* revision = sample.revision();
+  return revision != nullptr ? revision->given : sample.value();
+}
+
+CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, double s,
+                                     const Correlation* said) {
+  const Belief X0 = belief_of(before, said);
+  const Belief X1 = belief_of(after, said);
+  Transform X;
+  interpolate(collapse(X0), collapse(X1), s, X);
+  const Twist xi = log(X0.pose.inverse() * X1.pose);
+  const Matrix6d B0 = right_jacobian((s - 1.0) * xi) * right_jacobian(-xi).inverse();
+  const Matrix6d B1 = right_jacobian(s * xi) * right_jacobian(xi).inverse();
+  std::vector<CommonError> common_errors = times((1.0 - s) * B0, X0.common_errors);
+  add_errors(times(s * B1, X1.common_errors), common_errors);
+  return split(X, std::move(common_errors), is_unknown(before, said) || is_unknown(after, said));
+}
+
+CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
+                                       const Transform& X_newest, double s,
+                                       const Correlation* said) {
+  const double beyond = s - 1.0;
+  if (before.revision() == nullptr && after.revision() == nullptr) {
+    CorrelatedValue found;
+    extrapolate(before, after, X_newest, s, found.X_PC);
+    if (said == nullptr) return found;
+    found.correlation = *said;
+    for (CommonError& one : found.correlation.common_errors) one.loading *= s + beyond;
+    return found;
+  }
+  const Transform G0 = given(before);
+  const Transform G1 = given(after);
+  const Twist further = beyond * log(G0.pose.inverse() * G1.pose);
+  const Belief X1 = belief_of(after, said);
+  const Pose ahead = exp(further);
+  Transform X{X1.pose * ahead, StatedCovariance()};
+  const Matrix6d to_there = adjoint(ahead.inverse());
+  const Covariance offset = collapse(X1).covariance.of_specified().transported(ahead.inverse());
+  const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
+  X.covariance = bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));
+  X.covariance.set_complete(!X1.unspecified && G0.covariance.complete() &&
+                            G1.covariance.complete());
+  return split(X, times(to_there, X1.common_errors), is_unknown(after, said));
+}
+
+}  // namespace tfdude

@@ -1,0 +1,41 @@
+#pragma once
+
+#include "tfdude/types/correlation.hpp"
+
+#include "tree/sample.hpp"
+
+namespace tfdude {
+
+/// The value of an edge at an instant, and how its error is correlated with others.
+struct CorrelatedValue {
+  Transform X_PC;
+  Correlation correlation;
+};
+
+/// The value with all of its covariance, except for the common errors in `said`. This is what
+/// remains of a value whose other common errors are left out.
+[[nodiscard]] Transform whole(const Transform& X_PC, const Correlation& now,
+                              const Correlation* said);
+/// Of a sample. @param said  of its edge; null: nothing
+[[nodiscard]] Transform whole(const Sample& sample, const Correlation* said);
+
+/// Of a sample, as it was before all observations.
+[[nodiscard]] Transform given(const Sample& sample);
+
+/// How the error of a sample is correlated: as `said` of its edge, unless it was observed.
+[[nodiscard]] const Correlation* correlation_at(const Sample& sample, const Correlation* said);
+
+/// As interpolate() of two samples, at least one of which was observed. Common errors count by the
+/// share that each sample has in the value (interpolate.hpp), all else is own.
+[[nodiscard]] CorrelatedValue interpolate_observed(const Sample& before, const Sample& after,
+                                                   double s, const Correlation* said);
+
+/// As extrapolate() of two samples. An observation does not change the twist, which is that of the
+/// samples as given: the correction is an offset, and stays. Common errors that are said of the
+/// edge may differ from sample to sample, as own parts may, and grow as those do.
+/// @param X1  the value of `after`
+[[nodiscard]] CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
+                                                     const Transform& X1, double s,
+                                                     const Correlation* said);
+
+}  // namespace tfdude
