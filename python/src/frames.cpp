@@ -36,9 +36,10 @@ JointSpec make_joint(std::string name, const std::string& type, py::handle axis,
 }
 
 EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> count,
-                     py::handle process_noise) {
+                     py::handle process_noise, bool drifts) {
   EdgeTiming timing;
   timing.moving = moving;
+  timing.drifts = drifts;
   if (!span.is_none()) timing.span = to_duration(span, "span");
   if (count) timing.count = *count;
   if (!process_noise.is_none()) {
@@ -51,13 +52,13 @@ EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> co
 
 FrameSpec make_frame(std::string id, std::string parent, const Transform& X_PC,
                      std::optional<JointSpec> joint, bool moving, py::handle span,
-                     std::optional<std::size_t> count, py::handle process_noise) {
+                     std::optional<std::size_t> count, py::handle process_noise, bool drifts) {
   FrameSpec frame;
   frame.id = std::move(id);
   frame.parent = std::move(parent);
   frame.X_PC = X_PC;
-  if (moving || !span.is_none() || count || !process_noise.is_none()) {
-    frame.timing = timing_of(moving, span, count, process_noise);
+  if (moving || drifts || !span.is_none() || count || !process_noise.is_none()) {
+    frame.timing = timing_of(moving, span, count, process_noise, drifts);
   }
   if (joint) {
     joint->joint.X_PJ = X_PC;
@@ -101,11 +102,12 @@ void bind_frames(py::module_& module) {
       module, "FrameSpec",
       "A frame of a new Node: its id, its parent ('' makes it a root), and where it is in it.\n\n"
       "joint: moves it; X_PC then is the origin. moving: samples need no stamps to count as such.\n"
-      "span [s], count: how much history is kept. process_noise: covariance per second (6, 6).")
+      "span [s], count: how much history is kept. process_noise: covariance per second (6, 6).\n"
+      "drifts: the error is a random walk of that density, as that of odometry is.")
       .def(py::init(&make_frame), py::arg("id"), py::arg("parent") = "",
            py::arg("X_PC") = Transform{}, py::kw_only(), py::arg("joint") = py::none(),
            py::arg("moving") = false, py::arg("span") = py::none(), py::arg("count") = py::none(),
-           py::arg("process_noise") = py::none())
+           py::arg("process_noise") = py::none(), py::arg("drifts") = false)
       .def_readonly("id", &FrameSpec::id)
       .def_readonly("parent", &FrameSpec::parent)
       .def_readonly("X_PC", &FrameSpec::X_PC, "The value at the start.")

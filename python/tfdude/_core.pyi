@@ -303,6 +303,7 @@ class FrameSpec:
         span: _Duration | None = None,
         count: int | None = None,
         process_noise: npt.ArrayLike | None = None,
+        drifts: bool = False,
     ) -> None: ...
     @property
     def id(self) -> str: ...

@@ -26,8 +26,8 @@ constexpr std::array<std::string_view, 6> kFileKeys = {"partition", "clock",  "c
 constexpr std::array<std::string_view, 12> kFrameKeys = {
     "id",     "parent", "xyz",        "rpy",     "quat",        "matrix",
     "stddev", "cov",    "covariance", "history", "correlation", "sources"};
-constexpr std::array<std::string_view, 6> kHistoryKeys = {"span",   "count",     "process_noise",
-                                                          "moving", "max_ahead", "restart_after"};
+constexpr std::array<std::string_view, 7> kHistoryKeys = {
+    "span", "count", "process_noise", "drifts", "moving", "max_ahead", "restart_after"};
 
 // Reads the configuration file of a daemon.
 class Reader : public YamlFields {
@@ -85,6 +85,7 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
                         .and_then([&] { return max_ahead(*entries, what, timing.max_ahead); })
                         .and_then([&] { return number(*entries, "restart_after", what, restart); })
                         .and_then([&] { return numbers(*entries, "process_noise", what, noise); })
+                        .and_then([&] { return flag(*entries, "drifts", what, timing.drifts); })
                         .and_then([&] { return flag(*entries, "moving", what, timing.moving); });
   if (!read) return tl::unexpected(read.error());
   const auto refuse = [&](const std::string& key, const std::string& why) {

@@ -56,7 +56,7 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
 // A dynamic edge is observed with itself: a later sample has another error.
 bool is_moving(const std::string& id, const PathCorrelation& correlation) {
   const auto& with = correlation.observed_with;
-  return with.size() == 1 && with.front() == id;
+  return !with.empty() && with.front() == id;
 }
 
 // Whether an edge that this one was observed with does not depend on the source.
@@ -191,8 +191,8 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
     const PathCorrelation& correlation = answers[edge.part].correlations[edge.index];
     path.edges.push_back({belief_of(answers[edge.part].values[edge.index], correlation), edge.way});
     path.correlations.push_back(correlation);
-    if (is_moving(edge.info.id, correlation)) {
-      if (edge.way == Way::kBeside) path.moving.push_back(edge.info.id);
+    if (is_moving(edge.info.id, correlation) && edge.way == Way::kBeside) {
+      path.moving.push_back(edge.info.id);
       continue;
     }
     for (const std::string& id : correlation.observed_with) {

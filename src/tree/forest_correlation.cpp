@@ -47,7 +47,9 @@ void Forest::Impl::unlink(const HeldVersion& edge) {
     if (partner.correlation == nullptr || !partner.correlation->revised) continue;
     EdgeCorrelation left{partner.correlation->said, partner.correlation->now, true, 0};
     auto& with = left.now.observed_with;
-    with.erase(std::remove(with.begin(), with.end(), id), with.end());
+    const auto own = std::find(with.begin(), with.end(), id);
+    if (own == with.end()) continue;
+    with.erase(own);
     HeldVersion& fresh = push_held(*slot, partner.X_PC);
     set_correlation(fresh, std::make_unique<EdgeCorrelation>(std::move(left)));
   }
@@ -147,8 +149,6 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
                                  std::int64_t stamp) {
   SampleRevision fresh{revision.X_PC, revision.correlation};
-  // Nothing else is correlated with it, once there are later samples.
-  fresh.correlation.observed_with.clear();
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
     const std::uint64_t place = samples.place_of(stamp);
@@ -163,12 +163,48 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     }
   }
   const std::uint32_t slot = newest.slot;
+  const bool drifts = newest.samples != nullptr && newest.samples->timing().drifts;
   replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp);
-  if (frames_.newest_value(slot).stamp != stamp) return;
-  HeldVersion& shown = push_held(slot, revision.X_PC);
-  const Correlation said = shown.correlation != nullptr ? shown.correlation->said : Correlation();
-  set_correlation(shown, std::unique_ptr<EdgeCorrelation>(
-                             new EdgeCorrelation{said, fresh.correlation, true, 0}));
+  std::uint64_t number = frames_.newest_value(slot).samples->place_of(stamp);
+  while (drifts && ++number < frames_.newest_value(slot).samples->next()) {
+    const SampleHistory& samples = *frames_.newest_value(slot).samples;
+    const Sample& later = *samples.sample(number);
+    const Sample& before = *samples.sample(number - 1);
+    const std::int64_t at = later.stamp;
+    const CorrelatedValue value =
+        drifted(before, nullptr, given(later).pose, samples.timing().process_noise,
+                static_cast<double>(at - before.stamp) * 1e-9);
+    const SampleRevision moved{{given(later).pose, {}}, value.correlation};
+    replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
+  }
+  if (drifts || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
+}
+
+void Forest::Impl::show_revision(std::uint32_t slot) {
+  const HeldVersion& newest = frames_.newest_value(slot);
+  const Correlation said = newest.correlation != nullptr ? newest.correlation->said : Correlation();
+  const SampleRevision* revision = newest.samples->sample(newest.number)->revision();
+  std::unique_ptr<EdgeCorrelation> correlation;
+  if (revision != nullptr && !(revision->correlation.empty() && said.empty())) {
+    correlation.reset(new EdgeCorrelation{said, revision->correlation, true, 0});
+  } else if (newest.correlation == nullptr || !newest.correlation->revised) {
+    return;
+  }
+  HeldVersion& shown = push_held(slot, newest.X_PC);
+  set_correlation(shown, std::move(correlation));
+}
+
+void Forest::Impl::push_drifted(const HeldVersion& newest, const Pose& G_PC, std::int64_t stamp) {
+  const Sample& before = *newest.samples->sample(newest.number);
+  const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said : nullptr;
+  // A late value counts as no more certain than the newest one.
+  const double seconds = std::max(static_cast<double>(stamp - newest.stamp) * 1e-9, 0.0);
+  const CorrelatedValue value =
+      drifted(before, said, G_PC, newest.samples->timing().process_noise, seconds);
+  const SampleRevision revision{{G_PC, {}}, value.correlation};
+  const std::uint32_t slot = newest.slot;
+  push_checked(newest, {value.X_PC, nullptr, &revision}, stamp);
+  show_revision(slot);
 }
 
 void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& value,

@@ -140,7 +140,9 @@ class Forest::Impl {
   void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// The edges that were observed with this one are not correlated with its next value.
   void unlink(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
-  /// Corrects a dynamic edge at an instant.
+  /// Makes the row of a dynamic edge's newest sample that of the edge.
+  void show_revision(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  /// Corrects a dynamic edge at an instant. If it drifts, all later samples have the same error.
   void revise_sample(const HeldVersion& newest, const Revision& revision, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   /// Pushes the newest value again, with another correlation.
@@ -185,6 +187,16 @@ class Forest::Impl {
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
+  /// Whether the value continues that of an edge that drifts.
+  [[nodiscard]] static bool continues(const HeldVersion& newest, std::int64_t stamp) {
+    return newest.samples != nullptr && newest.samples->timing().drifts && stamp != kAlways &&
+           newest.limits() && !newest.left_behind() &&
+           stamp >= newest.stamp - newest.samples->timing().span.count();
+  }
+  void push_drifted(const HeldVersion& newest, const Pose& G_PC, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+  void push_checked(const HeldVersion& old, const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
   void append_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void restart_history(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)

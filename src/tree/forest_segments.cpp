@@ -172,6 +172,15 @@ SegmentValues values_of(const std::vector<Ends>& segments, std::vector<Reached>&
   return found;
 }
 
+// What an observation has found about the dynamic edge at that instant; null: nothing.
+const Correlation* row_at(const HeldVersion& edge, std::int64_t t) {
+  std::uint64_t back = 0;
+  const Sample* sample = t < edge.stamp ? edge.samples->around(t, edge.number, back).before
+                                        : edge.samples->sample(edge.number);
+  const bool there = sample != nullptr && (sample->stamp == t || edge.samples->timing().drifts);
+  return there ? correlation_at(*sample, nullptr) : nullptr;
+}
+
 // Adds the edges that each single edge was observed with. A dynamic edge is listed with itself: what
 // was observed is its sample, and a later one has another error.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
@@ -184,7 +193,12 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
     const HeldVersion* edge = edge_of(edges[i]);
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
-      found.correlations[i].observed_with = {edge->name->text};
+      auto& with = found.correlations[i].observed_with;
+      with = {edge->name->text};
+      const Correlation* row = found.stamp ? row_at(*edge, nanoseconds(*found.stamp)) : nullptr;
+      if (row == nullptr) continue;
+      std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),
+                   [&](const std::string& id) { return id != edge->name->text; });
     } else if (edge->correlation != nullptr) {
       found.correlations[i].observed_with = edge->correlation->now.observed_with;
     }

@@ -97,8 +97,14 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
 
 void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
   const HeldVersion& old = frames_.newest_value(slot);
+  if (continues(old, stamp)) return push_drifted(old, value.X_PC.pose, stamp);
+  push_checked(old, value, stamp);
+}
+
+void Forest::Impl::push_checked(const HeldVersion& old, const GivenValue& value,
+                                std::int64_t stamp) {
   if (stamp == kAlways) {
-    end_revision(push_held(slot, value.X_PC));
+    end_revision(push_held(old.slot, value.X_PC));
   } else if (!old.moving() || stamp > old.stamp) {
     append_sample(old, value, stamp);
   } else if (old.left_behind()) {

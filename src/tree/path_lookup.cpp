@@ -108,15 +108,17 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const HeldVersion&
   const double beyond = seconds(moment.t - edge.stamp);
   const double s = 1.0 + beyond / span;
   const bool revised = before->revision() != nullptr || newest->revision() != nullptr;
-  moment.correlated = moment.correlated || revised;
+  moment.correlated = moment.correlated || is_correlated(*newest);
   // A random walk of this density has also moved the sample before, by which the twist is wrong.
   const double noise = beyond * s + seconds(moment.age);
-  if constexpr (std::is_same_v<Value, Belief>) {
+  if constexpr (!std::is_same_v<Value, Pose>) {
     if (revised || said_of(edge) != nullptr) {
       CorrelatedValue ahead = extrapolate_correlated(*before, *newest, edge.X_PC, s, said_of(edge));
-      add_noise(ahead.X_PC, edge, noise);
       correlate_next(path, &ahead.correlation);
-      path.up(ahead.X_PC);
+      Transform& X = path.place();
+      X = ahead.X_PC;
+      add_noise(X, edge, noise);
+      path.up(X);
       return {};
     }
   }
@@ -148,7 +150,7 @@ void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
   const double s = static_cast<double>(moment.t - before.stamp) / span;
   const bool noisy = edge.samples->has_noise();
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
-  if (before.revision() != nullptr || after.revision() != nullptr) {
+  if (is_correlated(before) || is_correlated(after)) {
     moment.correlated = true;
     if constexpr (std::is_same_v<Value, Belief>) {
       CorrelatedValue value = interpolate_observed(before, after, s, said_of(edge));
@@ -187,7 +189,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const HeldVersion& edg
   const auto found = edge.samples->around(t, edge.number, moment.back);
   if (found.before == nullptr) return no_data(Errc::kTooOld);
   if (t == found.before->stamp) {
-    moment.correlated = moment.correlated || found.before->revision() != nullptr;
+    moment.correlated = moment.correlated || is_correlated(*found.before);
     correlate_next(path, correlation_at(*found.before, said_of(edge)));
     OfEdge<Value>& X = path.place();
     X = value_of<Value>(*found.before);

@@ -75,6 +75,23 @@ Transform whole(const Sample& sample, const Correlation* said) {
   return revision != nullptr ? whole(X, revision->correlation, said) : X;
 }
 
+CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pose& G_PC,
+                        const Covariance& density, double seconds) {
+  const Pose increment = given(before).pose.inverse() * G_PC;
+  const Pose back = increment.inverse();
+  const Transform X = before.value();
+  CorrelatedValue found{{X.pose * increment, X.covariance.of_specified().transported(back)}, {}};
+  Covariance::Upper added = density.upper();
+  for (double& one : added) one *= seconds;
+  found.X_PC.covariance += Covariance::trusted(added);
+  found.X_PC.covariance.set_complete(X.covariance.complete());
+  if (const Correlation* correlation = correlation_at(before, said)) {
+    found.correlation = *correlation;
+    found.correlation.common_errors = times(adjoint(back), correlation->common_errors);
+  }
+  return found;
+}
+
 Transform given(const Sample& sample) {
   const SampleRevision* revision = sample.revision();
   return revision != nullptr ? revision->given : sample.value();

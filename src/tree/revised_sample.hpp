@@ -19,8 +19,21 @@ struct CorrelatedValue {
 /// Of a sample. @param said  of its edge; null: nothing
 [[nodiscard]] Transform whole(const Sample& sample, const Correlation* said);
 
+/// A sample of an edge that drifts, some time after another one: its error is that of the other, and
+/// what the drift has added.
+/// @param G_PC  the pose as it was given
+/// @param seconds  from the other to this one; not negative
+[[nodiscard]] CorrelatedValue drifted(const Sample& before, const Correlation* said,
+                                      const Pose& G_PC, const Covariance& density, double seconds);
+
 /// Of a sample, as it was before all observations.
 [[nodiscard]] Transform given(const Sample& sample);
+
+/// Whether an observation has correlated the sample with others.
+[[nodiscard]] inline bool is_correlated(const Sample& sample) {
+  const SampleRevision* revision = sample.revision();
+  return revision != nullptr && !revision->correlation.empty();
+}
 
 /// How the error of a sample is correlated: as `said` of its edge, unless it was observed.
 [[nodiscard]] const Correlation* correlation_at(const Sample& sample, const Correlation* said);

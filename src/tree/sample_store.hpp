@@ -63,6 +63,7 @@ class SampleStore {
   for (const CommonError& one : revision->correlation.common_errors) {
     bytes += sizeof(one) + static_cast<std::size_t>(one.loading.size()) * sizeof(double);
   }
+  for (const std::string& id : revision->correlation.observed_with) bytes += sizeof(id) + id.size();
   return bytes;
 }
 

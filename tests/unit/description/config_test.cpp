@@ -184,7 +184,7 @@ TEST_CASE("limits of history are given for the file and for each frame") {
   refused("{process_noise: [-1, 0, 0, 0, 0, 0]}", ": process_noise: stddev[0]");
   refused("{moving: perhaps}", ": moving is neither true nor false");
   refused("{spam: 1}",
-          ": unknown key 'spam'; known are span, count, process_noise, moving, max_ahead, "
+          ": unknown key 'spam'; known are span, count, process_noise, drifts, moving, max_ahead, "
           "restart_after");
   refused("{max_ahead: -1}", ": max_ahead must be 0 to 1e9 seconds, or none");
   refused("{max_ahead: .nan}", ": max_ahead is not a finite number");

@@ -7,6 +7,7 @@
 
 #include "math/semidefinite.hpp"
 #include "support/catch.hpp"
+#include "support/consistency.hpp"
 #include "support/observed_chain.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
@@ -15,6 +16,7 @@
 namespace tfdude {
 namespace {
 
+using testing::Consistency;
 using testing::ContainsSubstring;
 using testing::eigenvalues;
 using testing::Gaussian;
@@ -26,34 +28,6 @@ constexpr auto kDown = ObservedEdge::Way::kDown;
 constexpr auto kBeside = ObservedEdge::Way::kBeside;
 constexpr auto kUp = ObservedEdge::Way::kUp;
 const std::string kSource = "observed:once";
-
-// Mean normalized squared errors of one quantity over the runs, which must lie where 99 % of all
-// such means do.
-class Consistency {
- public:
-  void add(const Belief& X, const Pose& truth) {
-    const Twist e = log(X.pose.inverse() * truth);
-    int rank = 0;
-    const Matrix6d inverse = pseudo_inverse(collapse(X).covariance.of_specified().matrix(), &rank);
-    sum_ += e.dot(inverse * e);
-    dimensions_ += rank;
-    ++runs_;
-  }
-  [[nodiscard]] double mean() const { return sum_ / runs_; }
-  [[nodiscard]] double low() const { return chi_squared_quantile(0.005, dimensions_) / runs_; }
-  [[nodiscard]] double high() const { return chi_squared_quantile(0.995, dimensions_) / runs_; }
-
- private:
-  double sum_ = 0;
-  int dimensions_ = 0;
-  int runs_ = 0;
-};
-
-#define CHECK_CONSISTENT(one)                                                  \
-  do {                                                                         \
-    INFO((one).mean() << " within " << (one).low() << " to " << (one).high()); \
-    CHECK(((one).mean() > (one).low() && (one).mean() < (one).high()));        \
-  } while (false)
 
 struct Ends {
   std::size_t from;

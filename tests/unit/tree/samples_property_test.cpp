@@ -90,9 +90,12 @@ class Reference {
     const Transform X1 = b.given.value_or(b.X);
     const Pose ahead = exp((s - 1) * log(X0.pose.inverse() * X1.pose));
     const Covariance of_twist = bound(X0.covariance.of_specified(), X1.covariance.of_specified());
-    return Transform{b.X.pose * ahead,
-                     bound(b.X.covariance.of_specified().transported(ahead.inverse()),
-                           Covariance::trusted(Matrix6d((s - 1) * (s - 1) * of_twist.matrix())))};
+    const Covariance offset = b.X.covariance.of_specified().transported(ahead.inverse());
+    StatedCovariance sum =
+        bound(offset, Covariance::trusted(Matrix6d((s - 1) * (s - 1) * of_twist.matrix())));
+    sum.set_complete(b.X.covariance.complete() && X0.covariance.complete() &&
+                     X1.covariance.complete());
+    return Transform{b.X.pose * ahead, sum};
   }
 
  private:

@@ -1,0 +1,179 @@
+#include <vector>
+
+#include "tfdude/math/observation.hpp"
+
+#include "support/catch.hpp"
+#include "support/consistency.hpp"
+#include "support/forest_support.hpp"
+#include "support/random.hpp"
+#include "support/sampling.hpp"
+#include "tree/forest.hpp"
+
+// An edge whose error is a random walk, beside a dense filter of odometry and a landmark.
+namespace tfdude {
+namespace {
+
+using testing::Approx;
+using testing::outcome;
+using testing::Random;
+
+constexpr double kStep = 0.1;  // [s]
+
+Time at(int step) { return Time(std::chrono::milliseconds(100 * step)); }
+
+Query when(int step) {
+  Query query;
+  query.at = at(step);
+  return query;
+}
+
+Pose shift(double x) { return Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}); }
+
+Covariance of_deviations(double translation, double rotation) {
+  return *Covariance::from_stddev(
+      {translation, translation, translation, rotation, rotation, rotation});
+}
+
+// world -> base drifts, world -> object stands.
+struct Drifting {
+  Drifting() {
+    REQUIRE(forest.add("world", "", {}));
+    REQUIRE(forest.add("base", "world", {}));
+    REQUIRE(forest.add("object", "world", {Pose(), of_deviations(1, 1)}));
+    EdgeTiming timing;
+    timing.drifts = true;
+    timing.process_noise = Q;
+    REQUIRE(forest.set_timing("base", timing));
+  }
+  void drive(int step) { REQUIRE(forest.update("base", {G, Covariance()}, at(step))); }
+
+  // As an observer does.
+  Result<void> see(const Transform& Z, int step, const std::string& source) {
+    const auto seen =
+        forest.lookup_segments({{"world", "base"}, {"world", "object"}}, when(step), {}, true);
+    if (!seen) return tl::unexpected(seen.error());
+    std::vector<ObservedEdge> edges;
+    for (std::size_t i = 0; i < 2; ++i) {
+      edges.push_back({belief_of(seen->values[i], seen->correlations[i]),
+                       i == 0 ? ObservedEdge::Way::kUp : ObservedEdge::Way::kDown});
+    }
+    const auto found = observe(edges, Z, source, {1.0, true});
+    if (!found) return tl::unexpected(found.error());
+    std::vector<Revision> revisions;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Belief& X = found->edges[i].X_PC;
+      revisions.push_back(
+          {i == 0 ? "base" : "object", {X.pose, X.own}, {false, X.common_errors, {}}});
+    }
+    return forest.revise(revisions, at(step), seen->commit);
+  }
+
+  [[nodiscard]] double sigma(const std::string& a, const std::string& b, int step) const {
+    const auto X = forest.lookup(a, b, when(step));
+    REQUIRE(X);
+    return std::sqrt(X->covariance.of_specified().upper()[0]);
+  }
+
+  const Covariance Q = of_deviations(0.02, 0.01);
+  Pose G;
+  Forest forest;
+};
+
+// A chain of odometry, one axis: the joint covariance of base and object, in closed form.
+struct Filter {
+  double base = 0;
+  double object = 1;
+  double both = 0;
+
+  void drive() { base += 0.02 * 0.02 * kStep; }
+  void see(double variance) {
+    const double S = base + object - 2 * both + variance;
+    const double k_base = (both - base) / S;
+    const double k_object = (object - both) / S;
+    const double gain_base = both - base;
+    const double gain_object = object - both;
+    const double new_both = both - k_base * gain_object;
+    base -= k_base * gain_base;
+    object -= k_object * gain_object;
+    both = new_both;
+  }
+  [[nodiscard]] double between() const { return std::sqrt(base + object - 2 * both); }
+};
+
+}  // namespace
+
+TEST_CASE("drift: the error of an edge grows with time, and what it was observed with stays") {
+  Drifting robot;
+  Filter filter;
+  const Covariance R = of_deviations(0.005, 1);  // translation only, so that one axis suffices
+  robot.drive(0);
+  for (int step = 1; step <= 30; ++step) {
+    INFO("step " << step);
+    robot.drive(step);
+    filter.drive();
+    REQUIRE(robot.see({Pose(), R}, step, "observed:" + std::to_string(step)));
+    filter.see(0.005 * 0.005);
+    CHECK(robot.sigma("world", "base", step) == Approx(std::sqrt(filter.base)).epsilon(2e-3));
+    CHECK(robot.sigma("world", "object", step) == Approx(std::sqrt(filter.object)).epsilon(2e-3));
+    CHECK(robot.sigma("base", "object", step) == Approx(filter.between()).epsilon(2e-3));
+  }
+}
+
+TEST_CASE("drift: a correction of the past is that of all later values") {
+  Drifting robot;
+  robot.drive(0);
+  for (int step = 1; step <= 10; ++step) {
+    robot.G = shift(0.1 * step);
+    robot.drive(step);
+  }
+  REQUIRE(robot.see({shift(2 - 0.5), of_deviations(1e-3, 1e-3)}, 5, "observed:a"));
+  const auto before = robot.forest.lookup("world", "base", when(5));
+  const auto later = robot.forest.lookup("world", "base", when(10));
+  REQUIRE(before);
+  REQUIRE(later);
+  // It moves as it was told, from where it was found to be.
+  CHECK(
+      (later->pose.translation() - before->pose.translation() - Eigen::Vector3d(0.5, 0, 0)).norm() <
+      1e-9);
+  CHECK(robot.sigma("base", "object", 5) == Approx(1e-3).epsilon(1e-2));
+  const double grown = std::sqrt(1e-6 + 5 * kStep * 0.02 * 0.02);
+  CHECK(robot.sigma("base", "object", 10) == Approx(grown).epsilon(0.05));
+  // So does the next value.
+  robot.G = shift(1.2);
+  robot.drive(11);
+  const auto next = robot.forest.lookup("world", "base", when(11));
+  REQUIRE(next);
+  CHECK(next->pose.translation().x() - later->pose.translation().x() == Approx(0.2));
+}
+
+TEST_CASE("drift: the object in the map and in the base is as certain as is right in 200 runs") {
+  Random random(4301);
+  INFO("seed " << random.seed());
+  testing::Consistency in_map;
+  testing::Consistency in_base;
+  for (int run = 0; run < 200; ++run) {
+    Drifting robot;
+    const Pose object = random.pose();
+    REQUIRE(robot.forest.update("object",
+                                {object * exp(random.twist(0.3, 0.1)), of_deviations(0.5, 0.3)}));
+    Pose truth;
+    const Pose forward = exp((Twist() << 0.3, 0, 0, 0, 0, 0.2).finished());
+    const Covariance R = of_deviations(0.005, 0.005);
+    const testing::Gaussian drift(Covariance::trusted(Matrix6d(kStep * robot.Q.matrix())));
+    const testing::Gaussian seen(R);
+    robot.drive(0);
+    for (int step = 1; step <= 30; ++step) {
+      robot.G = robot.G * forward;
+      truth = truth * forward * exp(Twist(drift(random)));
+      robot.drive(step);
+      const Pose Z = truth.inverse() * object * exp(Twist(seen(random)));
+      REQUIRE(robot.see({Z, R}, step, "observed:" + std::to_string(step)));
+    }
+    in_map.add(*robot.forest.lookup("world", "object", when(30)), object);
+    in_base.add(*robot.forest.lookup("base", "object", when(30)), truth.inverse() * object);
+  }
+  CHECK_CONSISTENT(in_map);
+  CHECK_CONSISTENT(in_base);
+}
+
+}  // namespace tfdude
