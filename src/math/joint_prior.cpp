@@ -33,7 +33,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
         X.common_errors.begin(), X.common_errors.end(),
         [](const CommonError& common_error) { return !common_error.loading.isZero(0); });
     if (!has_common && X.own.matrix().isZero(0)) continue;
-    // It has a new value since it was observed with others.
+    // An edge beside the path may have got a new value since it was observed with others.
     const bool observed = std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
     if (all[k].way == ObservedEdge::Way::kBeside && !observed) continue;
     edges_.push_back(k);

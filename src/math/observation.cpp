@@ -70,7 +70,9 @@ class Update {
     const Innovation innovation = innovation_of(m);
     Observation observation;
     judge(innovation, observation);
-    for (const ObservedEdge& edge : all_) observation.edges.push_back({edge.X_PC, false, false, {}});
+    for (const ObservedEdge& edge : all_) {
+      observation.edges.push_back({edge.X_PC, false, false, {}});
+    }
     if (independent_) note_innovation(m, innovation, observation);
     if (!observation.accepted) return observation;
     if (!independent_ && !weigh(m)) return observation;

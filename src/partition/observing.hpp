@@ -47,8 +47,8 @@ struct ObservedPath {
   bool torn = false;
 };
 
-/// @param beside  edges observed together with some of the path; those that are missing or cannot be
-///   asked are left out, as are those beyond kMaxCorrelated
+/// @param beside  edges observed together with some of the path; those that are missing or cannot
+///   be asked are left out, as are those beyond kMaxCorrelated
 /// @return kUnknownStart, kUnknownEnd, kNotConnected, kUnreachable, kInvalidInput (the path has no
 ///   edge, or too many).
 [[nodiscard]] Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,

@@ -181,8 +181,8 @@ const Correlation* row_at(const HeldVersion& edge, std::int64_t t) {
   return there ? correlation_at(*sample, nullptr) : nullptr;
 }
 
-// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself: what
-// was observed is its sample, and a later one has another error.
+// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself:
+// what was observed is its sample, and a later one has another error.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;

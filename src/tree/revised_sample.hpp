@@ -19,8 +19,8 @@ struct CorrelatedValue {
 /// Of a sample. @param said  of its edge; null: nothing
 [[nodiscard]] Transform whole(const Sample& sample, const Correlation* said);
 
-/// A sample of an edge that drifts, some time after another one: its error is that of the other, and
-/// what the drift has added.
+/// A sample of an edge that drifts, some time after another one: its error is that of the other,
+/// and what the drift has added.
 /// @param G_PC  the pose as it was given
 /// @param seconds  from the other to this one; not negative
 [[nodiscard]] CorrelatedValue drifted(const Sample& before, const Correlation* said,

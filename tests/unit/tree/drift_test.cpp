@@ -131,7 +131,7 @@ TEST_CASE("drift: a correction of the past is that of all later values") {
   const auto later = robot.forest.lookup("world", "base", when(10));
   REQUIRE(before);
   REQUIRE(later);
-  // It moves as it was told, from where it was found to be.
+  // The edge moves as it was told, from where it was found to be.
   CHECK(
       (later->pose.translation() - before->pose.translation() - Eigen::Vector3d(0.5, 0, 0)).norm() <
       1e-9);
