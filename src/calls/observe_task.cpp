@@ -122,9 +122,7 @@ Result<Task::Next> ObserveTask::values(std::vector<Reply> replies, Clock::time_p
   auto path = observed_path(plan_, *answers);
   if (!path) return tl::unexpected(path.error());
   path_ = *std::move(path);
-  if (path_.moving.empty()) return observe(path_, now);
-  left_out_.insert(left_out_.end(), path_.moving.begin(), path_.moving.end());
-  return Next::kPlan;
+  return observe(path_, now);
 }
 
 Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_point now) {

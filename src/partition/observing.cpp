@@ -53,10 +53,10 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
   return {};
 }
 
-// A dynamic edge is observed with itself: a later sample has another error.
+// A dynamic edge is listed with itself twice (Forest::lookup_segments()).
 bool is_moving(const std::string& id, const PathCorrelation& correlation) {
   const auto& with = correlation.observed_with;
-  return !with.empty() && with.front() == id;
+  return with.size() >= 2 && with[0] == id && with[1] == id;
 }
 
 // Whether an edge that this one was observed with does not depend on the source.
@@ -80,22 +80,25 @@ bool lacks_source(const ObservePlan& plan, const ObservedPath& path, std::size_t
   return false;
 }
 
-// The request of the edge's owner, in which all its edges are revised at once.
-ReviseRequest& revision_of(const ObservePlan& plan, const ObservedPath& path, const Edge& edge,
+// The request of the edge's owner, in which all its edges are revised at once; another one if it has
+// dynamic edges at another instant.
+ReviseRequest& revision_of(const ObservePlan& plan, const ObservedPath& path, std::size_t edge,
                            std::vector<Part>& parts) {
-  const Part& asked = plan.parts[edge.part];
-  const ObservedPath::Seen& seen = path.seen[edge.part];
-  auto part = std::find_if(parts.begin(), parts.end(),
-                           [&](const Part& one) { return one.owner == asked.owner; });
-  if (part == parts.end()) {
-    parts.push_back(asked);
-    part = std::prev(parts.end());
-    part->request.id = edge.info.id;  // an owner's filter checks it
-    part->request.body = ReviseRequest{{}, path.stamp, seen.commit, seen.incarnation};
+  const Part& asked = plan.parts[plan.edges[edge].part];
+  const ObservedPath::Seen& seen = path.seen[plan.edges[edge].part];
+  const std::string& id = plan.edges[edge].info.id;
+  const auto stamp = is_moving(id, path.correlations[edge]) ? seen.stamp : std::nullopt;
+  for (Part& part : parts) {
+    auto& request = std::get<ReviseRequest>(part.request.body);
+    if (part.owner != asked.owner || (stamp && request.stamp && stamp != request.stamp)) continue;
+    if (stamp) request.stamp = stamp;
+    request.seen = std::min(request.seen, seen.commit);
+    return request;
   }
-  auto& request = std::get<ReviseRequest>(part->request.body);
-  request.seen = std::min(request.seen, seen.commit);
-  return request;
+  Part& part = parts.emplace_back(asked);
+  part.request.id = id;  // an owner's filter checks it
+  part.request.body = ReviseRequest{{}, stamp, seen.commit, seen.incarnation};
+  return std::get<ReviseRequest>(part.request.body);
 }
 
 const Edge& edge_of(const ObservePlan& plan, const std::string& id) {
@@ -184,17 +187,13 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
       return fail(Errc::kNotOwner, "partition " + quote(plan.parts[i].partition) +
                                        " did not answer of all edges that it was asked for");
     }
-    path.seen.push_back({answers[i].commit, answers[i].incarnation});
+    path.seen.push_back({answers[i].commit, answers[i].incarnation, answers[i].stamp});
     if (i < plan.path_parts && answers[i].stamp) path.stamp = answers[i].stamp;
   }
   for (const Edge& edge : plan.edges) {
     const PathCorrelation& correlation = answers[edge.part].correlations[edge.index];
     path.edges.push_back({belief_of(answers[edge.part].values[edge.index], correlation), edge.way});
     path.correlations.push_back(correlation);
-    if (is_moving(edge.info.id, correlation) && edge.way == Way::kBeside) {
-      path.moving.push_back(edge.info.id);
-      continue;
-    }
     for (const std::string& id : correlation.observed_with) {
       const bool known =
           has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
@@ -212,8 +211,7 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
   std::vector<std::string> together;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const auto& [X_PC, corrected, forgotten, innovation] = observation.edges[k];
-    const std::string& id = plan.edges[k].info.id;
-    if (corrected && !forgotten && !is_moving(id, path.correlations[k])) together.push_back(id);
+    if (corrected && !forgotten) together.push_back(plan.edges[k].info.id);
   }
   std::vector<Part> parts;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
@@ -227,7 +225,7 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
           Revision{edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(X, together)};
       edge.revision->X_PC.covariance.set_complete(!X.unspecified);
     }
-    revision_of(plan, path, observed, parts).edges.push_back(std::move(edge));
+    revision_of(plan, path, k, parts).edges.push_back(std::move(edge));
   }
   return parts;
 }

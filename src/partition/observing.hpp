@@ -29,19 +29,19 @@ struct ObservePlan {
   [[nodiscard]] std::vector<std::string> beside(std::size_t part) const;
 };
 
-/// The plan with the values of all edges: those of the path at one instant, those beside it at any,
-/// since they are static.
+/// The plan with the values of all edges: those of the path at one instant, those beside it at their
+/// newest.
 struct ObservedPath {
   std::vector<ObservedEdge> edges;
   std::vector<PathCorrelation> correlations;  ///< as their owners store them
   struct Seen {
     std::uint64_t commit = 0;
     std::uint64_t incarnation = 0;
+    std::optional<Time> stamp;  ///< of its dynamic edges
   };
-  std::vector<Seen> seen;  ///< by part
-  std::optional<Time> stamp;
+  std::vector<Seen> seen;            ///< by part
+  std::optional<Time> stamp;         ///< of the path
   std::vector<std::string> missing;  ///< edges beside the path that must be requested, too
-  std::vector<std::string> moving;   ///< edges beside the path that have become dynamic since
   /// An edge lacks the source of its joint observation with another one: another observation may be
   /// in progress.
   bool torn = false;

@@ -31,7 +31,9 @@ void Forest::Impl::set_correlation(HeldVersion& fresh,
 }
 
 void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
-  unlink(fresh);
+  // The next value of an edge that drifts has the same error.
+  const bool drifts = fresh.samples != nullptr && fresh.samples->timing().drifts;
+  if (!drifts) unlink(fresh);
   const Correlation& said = fresh.correlation->said;
   std::unique_ptr<EdgeCorrelation> correlation;
   if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});

@@ -181,8 +181,8 @@ const Correlation* row_at(const HeldVersion& edge, std::int64_t t) {
   return there ? correlation_at(*sample, nullptr) : nullptr;
 }
 
-// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself:
-// what was observed is its sample, and a later one has another error.
+// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself
+// twice: what was observed is its sample, and a later one has another error.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
@@ -194,7 +194,7 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
       auto& with = found.correlations[i].observed_with;
-      with = {edge->name->text};
+      with = {edge->name->text, edge->name->text};
       const Correlation* row = found.stamp ? row_at(*edge, nanoseconds(*found.stamp)) : nullptr;
       if (row == nullptr) continue;
       std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),

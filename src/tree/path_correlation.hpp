@@ -25,7 +25,9 @@ struct StoredCorrelation {
 struct PathCorrelation {
   std::optional<Covariance> unknown;
   std::vector<CommonError> common_errors;
-  std::vector<std::string> observed_with;  ///< of a single edge, as in Correlation; otherwise empty
+  /// Of a single edge, as in Correlation; otherwise empty. For a lookup of edges, a dynamic edge is
+  /// listed with itself twice, before those.
+  std::vector<std::string> observed_with;
 
   [[nodiscard]] bool empty() const {
     return !unknown && common_errors.empty() && observed_with.empty();
