@@ -80,8 +80,8 @@ bool lacks_source(const ObservePlan& plan, const ObservedPath& path, std::size_t
   return false;
 }
 
-// The request of the edge's owner, in which all its edges are revised at once; another one if it has
-// dynamic edges at another instant.
+// The request of the edge's owner, in which all its edges are revised at once; another one if it
+// has dynamic edges at another instant.
 ReviseRequest& revision_of(const ObservePlan& plan, const ObservedPath& path, std::size_t edge,
                            std::vector<Part>& parts) {
   const Part& asked = plan.parts[plan.edges[edge].part];

@@ -29,8 +29,8 @@ struct ObservePlan {
   [[nodiscard]] std::vector<std::string> beside(std::size_t part) const;
 };
 
-/// The plan with the values of all edges: those of the path at one instant, those beside it at their
-/// newest.
+/// The plan with the values of all edges: those of the path at one instant, those beside it at
+/// their newest.
 struct ObservedPath {
   std::vector<ObservedEdge> edges;
   std::vector<PathCorrelation> correlations;  ///< as their owners store them
