@@ -32,8 +32,7 @@ void Forest::Impl::set_correlation(HeldVersion& fresh,
 
 void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
   // The next value of an edge that drifts has the same error.
-  const bool drifts = fresh.samples != nullptr && fresh.samples->timing().drifts;
-  if (!drifts) unlink(fresh);
+  if (!drifts(fresh)) unlink(fresh);
   const Correlation& said = fresh.correlation->said;
   std::unique_ptr<EdgeCorrelation> correlation;
   if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
@@ -165,10 +164,10 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     }
   }
   const std::uint32_t slot = newest.slot;
-  const bool drifts = newest.samples != nullptr && newest.samples->timing().drifts;
+  const bool carries_on = drifts(newest);
   replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp);
   std::uint64_t number = frames_.newest_value(slot).samples->place_of(stamp);
-  while (drifts && ++number < frames_.newest_value(slot).samples->next()) {
+  while (carries_on && ++number < frames_.newest_value(slot).samples->next()) {
     const SampleHistory& samples = *frames_.newest_value(slot).samples;
     const Sample& later = *samples.sample(number);
     const Sample& before = *samples.sample(number - 1);
@@ -179,7 +178,7 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     const SampleRevision moved{{given(later).pose, {}}, value.correlation};
     replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
   }
-  if (drifts || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
+  if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
 }
 
 void Forest::Impl::show_revision(std::uint32_t slot) {
@@ -196,16 +195,25 @@ void Forest::Impl::show_revision(std::uint32_t slot) {
   set_correlation(shown, std::move(correlation));
 }
 
-void Forest::Impl::push_drifted(const HeldVersion& newest, const Pose& G_PC, std::int64_t stamp) {
+// The first value of a history says where the edge begins, with the covariance that is known of it.
+void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& value,
+                                 std::int64_t stamp) {
+  const std::int64_t span = newest.samples->timing().span.count();
+  if (!newest.limits() || newest.left_behind() || stamp < newest.stamp - span) {
+    Transform X_PC = value.X_PC;
+    if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
+    return push_checked(newest, {X_PC}, stamp);
+  }
   const Sample& before = *newest.samples->sample(newest.number);
   const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said : nullptr;
   // A late value counts as no more certain than the newest one.
   const double seconds = std::max(static_cast<double>(stamp - newest.stamp) * 1e-9, 0.0);
-  const CorrelatedValue value =
+  const Pose& G_PC = value.X_PC.pose;
+  const CorrelatedValue next =
       drifted(before, said, G_PC, newest.samples->timing().process_noise, seconds);
-  const SampleRevision revision{{G_PC, {}}, value.correlation};
+  const SampleRevision revision{{G_PC, {}}, next.correlation};
   const std::uint32_t slot = newest.slot;
-  push_checked(newest, {value.X_PC, nullptr, &revision}, stamp);
+  push_checked(newest, {next.X_PC, nullptr, &revision}, stamp);
   show_revision(slot);
 }
 

@@ -187,13 +187,10 @@ class Forest::Impl {
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
-  /// Whether the value continues that of an edge that drifts.
-  [[nodiscard]] static bool continues(const HeldVersion& newest, std::int64_t stamp) {
-    return newest.samples != nullptr && newest.samples->timing().drifts && stamp != kAlways &&
-           newest.limits() && !newest.left_behind() &&
-           stamp >= newest.stamp - newest.samples->timing().span.count();
+  [[nodiscard]] static bool drifts(const HeldVersion& edge) {
+    return edge.samples != nullptr && edge.samples->timing().drifts;
   }
-  void push_drifted(const HeldVersion& newest, const Pose& G_PC, std::int64_t stamp)
+  void push_of_drift(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void push_checked(const HeldVersion& old, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);

@@ -97,7 +97,7 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
 
 void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {
   const HeldVersion& old = frames_.newest_value(slot);
-  if (continues(old, stamp)) return push_drifted(old, value.X_PC.pose, stamp);
+  if (drifts(old) && stamp != kAlways) return push_of_drift(old, value, stamp);
   push_checked(old, value, stamp);
 }
 
