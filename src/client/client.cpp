@@ -6,7 +6,6 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "runtime/participant.hpp"
-#include "tree/over_fixed.hpp"
 
 namespace tfdude {
 namespace {
@@ -201,12 +200,9 @@ Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, 
 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
                                         const Query& at_b, std::string_view fixed) {
-  const Deadline deadline = participant_->discovery().call_deadline();
-  const auto X_FA = participant_->lookups().lookup(fixed, a, at_a, deadline);
-  if (!X_FA) return tl::unexpected(X_FA.error());
-  const auto X_FB = participant_->lookups().lookup(fixed, b, at_b, deadline);
-  if (!X_FB) return tl::unexpected(X_FB.error());
-  return over_fixed(*X_FA, *X_FB);
+  return participant_->two_instants().lookup(std::string(a), at_a, std::string(b), at_b,
+                                             std::string(fixed),
+                                             participant_->discovery().call_deadline());
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,

@@ -53,12 +53,6 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
   return {};
 }
 
-// A dynamic edge is listed with itself twice (Forest::lookup_segments()).
-bool is_moving(const std::string& id, const PathCorrelation& correlation) {
-  const auto& with = correlation.observed_with;
-  return with.size() >= 2 && with[0] == id && with[1] == id;
-}
-
 // Whether an edge that this one was observed with does not depend on the source.
 bool lacks_source(const ObservePlan& plan, const ObservedPath& path, std::size_t edge) {
   const auto& own = path.edges[edge].X_PC.common_errors;
@@ -134,6 +128,11 @@ Correlation correlation_of(const Belief& X, const std::vector<std::string>& toge
 }
 
 }  // namespace
+
+bool is_moving(const std::string& id, const PathCorrelation& correlation) {
+  const auto& with = correlation.observed_with;
+  return with.size() >= 2 && with[0] == id && with[1] == id;
+}
 
 Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,
                                   const std::string& a, const std::string& b,

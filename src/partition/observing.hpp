@@ -13,6 +13,9 @@
 // part.
 namespace tfdude {
 
+/// Whether an edge is dynamic, as an answer says (PathCorrelation::observed_with).
+[[nodiscard]] bool is_moving(const std::string& id, const PathCorrelation& correlation);
+
 /// The edges affected by an observation, and the requests to their owners.
 struct ObservePlan {
   struct Edge {

@@ -33,6 +33,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       watch_server_(context_, watches_),
       lookups_(context_, watches_),
       velocities_(context_, lookups_),
+      two_instants_(context_, lookups_),
       descriptions_(requests_, options.description),
       streams_(context_) {
   const Lock lock(structure_.mutex);

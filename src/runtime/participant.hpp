@@ -21,6 +21,7 @@
 #include "runtime/requests.hpp"
 #include "runtime/serving.hpp"
 #include "runtime/streams.hpp"
+#include "runtime/two_instants.hpp"
 #include "runtime/velocities.hpp"
 #include "runtime/watch_client.hpp"
 #include "runtime/watch_server.hpp"
@@ -59,6 +60,7 @@ class Participant final : public TransportHandler,
   [[nodiscard]] WatchClient& watches() { return watches_; }
   [[nodiscard]] Lookups& lookups() { return lookups_; }
   [[nodiscard]] Velocities& velocities() { return velocities_; }
+  [[nodiscard]] TwoInstants& two_instants() { return two_instants_; }
   [[nodiscard]] Descriptions& descriptions() { return descriptions_; }
   /// @return kInvalidInput in a client that follows only some frames
   [[nodiscard]] Result<Streams*> streams();
@@ -147,6 +149,7 @@ class Participant final : public TransportHandler,
   WatchServer watch_server_;
   Lookups lookups_;
   Velocities velocities_;
+  TwoInstants two_instants_;
   Descriptions descriptions_;
   std::atomic<std::uint64_t> jumps_{0};  // of the clock
   Streams streams_;

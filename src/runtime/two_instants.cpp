@@ -1,0 +1,133 @@
+#include "runtime/two_instants.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "calls/lookup_in_progress.hpp"
+#include "math/symmetric_eigen.hpp"
+#include "partition/observing.hpp"
+#include "tree/over_fixed.hpp"
+
+namespace tfdude {
+namespace {
+
+// Asks for the edges of two paths from one frame, each at its instant, then which of those that are
+// on both are static.
+class TwoPathsTask final : public Task {
+ public:
+  TwoPathsTask(const Forest& forest, std::string fixed, std::string a, std::string b,
+               const Query& at_a, const Query& at_b)
+      : forest_(forest),
+        fixed_(std::move(fixed)),
+        ends_{std::move(a), std::move(b)},
+        at_{at_a, at_b} {}
+
+  [[nodiscard]] std::vector<std::string> frames() const override {
+    return {fixed_, ends_[0], ends_[1]};
+  }
+  [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point) override {
+    parts_.clear();
+    for (const std::size_t side : {0U, 1U}) {
+      auto planned = route_observe(forest_, directory, fixed_, ends_[side], {}, at_[side].at);
+      if (!planned) return tl::unexpected(std::move(planned.error()));
+      plans_[side] = *std::move(planned);
+      auto& parts = plans_[side].parts;
+      for (Part& part : parts) std::get<LookupRequest>(part.request.body).query = at_[side];
+      parts_.insert(parts_.end(), parts.begin(), parts.end());
+    }
+    return {};
+  }
+  [[nodiscard]] std::vector<Part>& parts() override { return parts_; }
+  [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point) override {
+    auto answers = values_of(std::move(replies));
+    if (!answers) return tl::unexpected(std::move(answers.error()));
+    const auto middle = answers->begin() + static_cast<std::ptrdiff_t>(plans_[0].parts.size());
+    for (const std::size_t side : {0U, 1U}) {
+      auto path = observed_path(plans_[side], side == 0 ? std::vector(answers->begin(), middle)
+                                                        : std::vector(middle, answers->end()));
+      if (!path) return tl::unexpected(std::move(path.error()));
+      paths_[side] = *std::move(path);
+    }
+    return Next::kDone;
+  }
+
+  /// Once it is done: the pose of b in a.
+  [[nodiscard]] Belief X_AB() {
+    for (std::size_t i = 0; i < plans_[0].edges.size(); ++i) {
+      const std::string& id = plans_[0].edges[i].info.id;
+      const auto& others = plans_[1].edges;
+      const auto same = std::find_if(others.begin(), others.end(),
+                                     [&](const auto& edge) { return edge.info.id == id; });
+      if (same == others.end()) continue;
+      const auto k = static_cast<std::size_t>(same - others.begin());
+      const bool one_error = is_static(0, i) && is_static(1, k);
+      for (Belief* X : {&paths_[0].edges[i].X_PC, &paths_[1].edges[k].X_PC}) {
+        share(*X, id, one_error || (at_[0].at && at_[0].at == at_[1].at));
+      }
+    }
+    return compose(inverse(along(0)), along(1), at_[1].order);
+  }
+
+ private:
+  [[nodiscard]] bool is_static(std::size_t side, std::size_t edge) const {
+    return !is_moving(plans_[side].edges[edge].info.id, paths_[side].correlations[edge]);
+  }
+
+  // The own error is one that the edge has twice, or it may be correlated with itself in any way.
+  static void share(Belief& X, const std::string& id, bool one_error) {
+    if (X.unknown || X.own.matrix().isZero(0)) return;
+    if (one_error) {
+      const SymmetricEigen eigen = symmetric_eigen(X.own.matrix());
+      const Loading root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+      X.common_errors.push_back({"edge:" + id, false, root});
+    } else {
+      X.unknown = X.own;
+    }
+    X.own = {};
+  }
+
+  [[nodiscard]] Belief along(std::size_t side) const {
+    Belief X;
+    for (const ObservedEdge& edge : paths_[side].edges) {
+      const bool up = edge.way == ObservedEdge::Way::kUp;
+      X = compose(X, up ? inverse(edge.X_PC) : edge.X_PC, at_[side].order);
+    }
+    return X;
+  }
+
+  const Forest& forest_;
+  const std::string fixed_;
+  const std::string ends_[2];
+  const Query at_[2];
+  ObservePlan plans_[2];
+  ObservedPath paths_[2];
+  std::vector<Part> parts_;
+};
+
+}  // namespace
+
+Result<StampedTransform> TwoInstants::lookup(const std::string& a, const Query& at_a,
+                                             const std::string& b, const Query& at_b,
+                                             const std::string& fixed, const Deadline& deadline) {
+  const auto X_FA = lookups_.lookup<std::string_view>(fixed, a, at_a, deadline);
+  if (!X_FA) return tl::unexpected(X_FA.error());
+  const auto X_FB = lookups_.lookup<std::string_view>(fixed, b, at_b, deadline);
+  if (!X_FB) return tl::unexpected(X_FB.error());
+  StampedTransform X_AB = over_fixed(*X_FA, *X_FB);
+  if (!X_AB.covariance.complete() || a == fixed || b == fixed) return X_AB;
+  Query then_a = at_a;
+  Query then_b = at_b;
+  then_a.at = X_FA->stamp;
+  then_b.at = X_FB->stamp;
+  TwoPathsTask task(structure_.forest, fixed, a, b, then_a, then_b);
+  if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
+  const Belief whole = task.X_AB();
+  X_AB.covariance = collapse(whole).covariance;
+  X_AB.basis.bound = whole.unknown.has_value();
+  return X_AB;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,87 @@
+// The uncertainty of a pose between two instants: an edge on both ways has one error, or one that is
+// not known to be another. Closed forms.
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::Approx;
+
+Query at(int seconds) {
+  Query query;
+  query.at = Time(std::chrono::seconds(seconds));
+  return query;
+}
+
+Covariance of_deviations(double translation, double rotation) {
+  return *Covariance::from_stddev(
+      {translation, translation, translation, rotation, rotation, rotation});
+}
+
+Pose turned(double yaw, double x = 0) {
+  return Pose::trusted(Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ())),
+                       {x, 0, 0});
+}
+
+// map -> odom of one owner, base -> mount of another one. The base moves exactly.
+struct Robot {
+  Robot(const Covariance& of_odom, const Covariance& of_base, const Covariance& of_mount) {
+    nodes.push_back(
+        Node::open(join("map"), "map", {{"map", "", {}}, {"odom", "map", {Pose(), of_odom}}})
+            .value());
+    nodes.push_back(Node::open(join("base"), "base",
+                               {{"base", "odom", {Pose(), of_base}},
+                                {"mount", "base", {turned(0, 1), of_mount}}})
+                        .value());
+    REQUIRE(nodes[1].update("base", {Pose(), of_base}, *at(1).at));
+    REQUIRE(nodes[1].update("base", {turned(std::acos(-1.0), 1), of_base}, *at(2).at));
+    REQUIRE(nodes[1].update("base", {turned(std::acos(-1.0), 2), of_base}, *at(3).at));
+  }
+  [[nodiscard]] Twist variances(const std::string& frame, int from, int to,
+                                const std::string& fixed) {
+    const auto X = nodes[0].lookup(frame, at(from), frame, at(to), fixed);
+    REQUIRE(X);
+    bound = X->basis.bound;
+    return X->covariance.of_specified().matrix().diagonal();
+  }
+
+  testing::Join join = testing::join_loopback();
+  std::vector<Node> nodes;
+  bool bound = false;
+};
+
+}  // namespace
+
+TEST_CASE("two instants: a static edge has one error, which cancels or doubles") {
+  Robot robot(Covariance(), Covariance(), of_deviations(0.01, 0));
+  CHECK(robot.variances("mount", 2, 3, "odom").cwiseAbs().maxCoeff() < 1e-15);
+  const Twist half_a_turn = robot.variances("mount", 1, 2, "odom");
+  CHECK(half_a_turn[0] == Approx(0.02 * 0.02));
+  CHECK(half_a_turn[1] == Approx(0.02 * 0.02));
+  CHECK(std::abs(half_a_turn[2]) < 1e-15);
+  CHECK_FALSE(robot.bound);
+}
+
+TEST_CASE("two instants: what is above the moving edges does not count") {
+  Robot robot(of_deviations(1, 0.1), Covariance(), Covariance());
+  CHECK(robot.variances("mount", 1, 3, "map").cwiseAbs().maxCoeff() < 1e-12);
+  CHECK_FALSE(robot.bound);
+}
+
+TEST_CASE("two instants: the errors of a dynamic edge may be correlated in any way") {
+  Robot robot(Covariance(), of_deviations(0.01, 0), Covariance());
+  CHECK(robot.variances("base", 2, 3, "odom")[0] == Approx(0.02 * 0.02));
+  CHECK(robot.bound);
+  CHECK(robot.variances("base", 3, 3, "odom").cwiseAbs().maxCoeff() < 1e-15);
+}
+
+}  // namespace tfdude
