@@ -1,5 +1,5 @@
-// The uncertainty of a pose between two instants: an edge on both ways has one error, or one that is
-// not known to be another. Closed forms.
+// The uncertainty of a pose between two instants: an edge on both ways has one error, or one that
+// is not known to be another. Closed forms.
 
 #include <cmath>
 #include <string>
