@@ -228,7 +228,8 @@ class TFDUDE_EXPORT Client {
                                                 const Query& query, Milliseconds wait);
 
   /// Frame b at one instant seen from frame a at another, through a frame that is assumed fixed in
-  /// between: X_AF(at_a) X_FB(at_b). The two transforms count as independent.
+  /// between: X_AF(at_a) X_FB(at_b). A static edge on both ways has the same error twice. If a
+  /// dynamic one is, its errors may be correlated in any way, and the covariance is an upper bound.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, const Query& at_a,
                                                 std::string_view b, const Query& at_b,
                                                 std::string_view fixed);
@@ -326,7 +327,7 @@ class TFDUDE_EXPORT Client {
   /// as one commit. Dynamic edges are corrected by a sample with the measurement's stamp. A
   /// measurement that the gate rejects changes nothing; this is not an error. Takes at least two
   /// round trips, since each edge is requested separately, together with those that were observed
-  /// with it.
+  /// with it. If an owner rejects its part, the others' parts are taken back.
   /// @param X_AB  with the covariance of the measurement's own error
   /// @param stamp  time of the measurement; absent: the newest instant for which all dynamic edges
   ///   have data
