@@ -38,6 +38,8 @@ class PendingRequests {
   PendingRequests(ReplyTable& table, std::vector<Part>& parts, const TimeLimit& limit,
                   ReplyListener* listener = nullptr);
 
+  [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
+
   /// For a thread that waits for the replies: answers what is held here, sends what is due, and
   /// gives up at the time limit. @return when to go on, unless complete() before
   Clock::time_point step(Clock::time_point now, RequestLink& link);

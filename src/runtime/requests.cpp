@@ -58,7 +58,7 @@ void Requests::go_on(Call& call, Task& task, const Deadline& deadline) {
       discovery_.wait_for_change(deadline);
       return call.resume();
     case Call::State::kAsk:
-      await_replies(task.parts(), call.requests(), deadline);
+      await(call.requests(), deadline);
       return call.replied(Clock::now());
     case Call::State::kConfirm:
       return confirm(call, deadline);
@@ -79,8 +79,8 @@ void Requests::plan(Call& call) {
   call.plan(structure_.directory, structure_.forest.structure_version(), certain, Clock::now());
 }
 
-void Requests::await_replies(const std::vector<Part>& parts, PendingRequests& requests,
-                             const Deadline& deadline) {
+void Requests::await(PendingRequests& requests, const Deadline& deadline) {
+  const std::vector<Part>& parts = requests.parts();
   // Own changes are announced before a request: other owners build on them.
   const bool builds = std::any_of(parts.begin(), parts.end(), [](const Part& part) {
     return part.owner != kHeldHere && !is_read_only(part.request);
@@ -126,7 +126,7 @@ Result<void> Requests::conclude(const Call& call, const Deadline& deadline) {
 
 std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadline) {
   PendingRequests requests(replies_, parts, deadline);
-  await_replies(parts, requests, deadline);
+  await(requests, deadline);
   return requests.take_replies();
 }
 

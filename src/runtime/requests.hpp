@@ -134,6 +134,8 @@ class Requests final : public RequestLink {
     return this->find(deadline, {}, Task::kAnyAge, std::move(find));
   }
 
+  /// Sends requests until all are complete, without planning.
+  void await(PendingRequests& requests, const Deadline& deadline);
   /// A reply for each part, without planning; kTimeout for those that have not replied by the
   /// deadline.
   [[nodiscard]] std::vector<Reply> ask(std::vector<Part>& parts, const Deadline& deadline);
@@ -183,8 +185,6 @@ class Requests final : public RequestLink {
 
   void go_on(Call& call, Task& task, const Deadline& deadline);
   void plan(Call& call);
-  void await_replies(const std::vector<Part>& parts, PendingRequests& requests,
-                     const Deadline& deadline);
   void confirm(Call& call, const Deadline& deadline);
   void pause(const Call& call);
   [[nodiscard]] Result<void> conclude(const Call& call, const Deadline& deadline);

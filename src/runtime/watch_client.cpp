@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/number.hpp"
 
+#include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
 
 namespace tfdude {
@@ -21,6 +22,12 @@ Result<void> check_rate(double rate) {
 }
 
 }  // namespace
+
+WatchClient::WatchClient(const Context& context)
+    : context_(context),
+      routes_(context.threads.callbacks.line()),
+      rounds_(context.requests.replies(), context.options.timeout),
+      job_(context.threads.asking, [this] { return round(); }) {}
 
 Result<std::shared_ptr<WatchedPath>> WatchClient::watch(const std::string& a, const std::string& b,
                                                         const WatchOptions& options) {
@@ -52,7 +59,7 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
 Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<WatchedPath> path,
                                                          const Deadline& deadline) {
   watches_paths_ = true;
-  loop_.add(path);
+  add(path);
   auto live = path->wait_until_live(deadline.at());
   if (live) return path;
   if (live.error().code == Errc::kNotYet) return unanswered(*path, deadline);
@@ -61,7 +68,10 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<Watched
 
 tl::unexpected<Error> WatchClient::unanswered(const WatchedPath& path, const Deadline& deadline) {
   std::string owners;
-  if (const auto route = path.route(context_)) {
+  const std::uint64_t own_incarnation = context_.member.incarnation();
+  Structure& structure = context_.structure;
+  const Lock lock(structure.mutex);
+  if (const auto route = path.route({structure.forest, structure.directory, own_incarnation})) {
     for (const WatchRoute::Source& source : route->sources) {
       owners += (owners.empty() ? "" : ", ") + quote(source.partition);
     }
@@ -87,13 +97,38 @@ Result<std::shared_ptr<WatchedPartition>> WatchClient::watch_partition(
   const Milliseconds gather = rate > 0 ? Milliseconds(0) : WatchedPartition::kGather;
   auto watched = std::make_shared<WatchedPartition>(partition, rate, std::move(listener),
                                                     context_.threads.callbacks.line(gather));
-  loop_.add(watched);
+  add(watched);
   return watched;
 }
 
 bool WatchClient::on_pushed(const PushedValues& pushed) {
-  loop_.on_pushed(pushed);
+  const auto due = rounds_.on_pushed(pushed, Loop::Clock::now());
+  if (due != WatchRounds::kNever) job_.ask_by(due);
   return watches_paths_;
+}
+
+void WatchClient::add(std::shared_ptr<Watched> watched) {
+  rounds_.add(std::move(watched));
+  job_.ask();
+}
+
+Loop::Clock::time_point WatchClient::round() {
+  rounds_.begin(Loop::Clock::now());
+  while (PendingRequests* asked = rounds_.step(Loop::Clock::now(), *this)) {
+    context_.requests.await(*asked, Deadline(context_.options.timeout));
+  }
+  return rounds_.next();
+}
+
+Result<void> WatchClient::plan(Watched& watched) {
+  const std::uint64_t own_incarnation = context_.member.incarnation();
+  // If nobody can say whether the route is still right, the known one must do.
+  auto known =
+      context_.requests.know(watched.frames(), Task::kFresh, Deadline(context_.options.timeout));
+  Structure& structure = context_.structure;
+  const Lock lock(structure.mutex);
+  auto planned = watched.plan({structure.forest, structure.directory, own_incarnation});
+  return planned || known ? planned : known;
 }
 
 }  // namespace tfdude

@@ -5,23 +5,30 @@
 #include <string>
 #include <vector>
 
+#include "base/loop.hpp"
 #include "runtime/context.hpp"
-#include "runtime/watch_loop.hpp"
+#include "runtime/watch_rounds.hpp"
 #include "runtime/watched_partition.hpp"
 #include "runtime/watched_path.hpp"
 
 namespace tfdude {
 
-/// The watcher's side of pushed values: begins watches, and passes values to them.
-/// @par Thread safety  All functions are thread-safe.
-class WatchClient {
+/// The watcher's side of pushed values: begins watches, passes values to them, and runs their
+/// rounds as a job that waits for the replies.
+/// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
+class WatchClient final : private WatchLink {
  public:
-  explicit WatchClient(const Context& context)
-      : context_(context), routes_(context.threads.callbacks.line()), loop_(context) {}
+  explicit WatchClient(const Context& context);
+  ~WatchClient() override { stop(); }
+  WatchClient(const WatchClient&) = delete;
+  WatchClient& operator=(const WatchClient&) = delete;
 
   /// After it has returned nothing new comes. Call from one thread; nothing may be watched
   /// afterwards.
-  void stop() { loop_.stop(); }
+  void stop() {
+    job_.stop();
+    rounds_.end();
+  }
 
   /// @return as Client::watch()
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
@@ -42,13 +49,24 @@ class WatchClient {
   /// Whether pushed values of a watched path suffice for this lookup.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const {
-    return loop_.can_answer(a, b, query);
+    return rounds_.can_answer(a, b, query);
   }
 
   /// What a plan would find has changed.
-  void look_again() { loop_.look_again(); }
+  void look_again() {
+    if (rounds_.look_again()) job_.ask();
+  }
 
  private:
+  // WatchLink
+  [[nodiscard]] Result<void> plan(Watched& watched) override;
+  [[nodiscard]] Result<void> open(const std::string& partition, std::uint64_t group) override {
+    return context_.transport.watch(partition, group);
+  }
+  void close(std::uint64_t group) override { context_.transport.unwatch(group); }
+
+  void add(std::shared_ptr<Watched> watched);
+  [[nodiscard]] Loop::Clock::time_point round();
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
                                                             const Deadline& deadline);
   /// kTimeout, naming the owners.
@@ -57,7 +75,8 @@ class WatchClient {
   const Context context_;
   const std::shared_ptr<Callbacks::Line> routes_;
   std::atomic<bool> watches_paths_{false};  // or has watched one before
-  WatchLoop loop_;
+  WatchRounds rounds_;
+  Loop::Job job_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

@@ -16,15 +16,20 @@
 
 namespace tfdude {
 
-struct Context;
+/// What is planned with.
+struct KnownStructure {
+  const Forest& forest;
+  const Directory& directory;
+  std::uint64_t own_incarnation = 0;  ///< of the partition of this process
+};
 
 /// @param rate  [Hz]; 0: every sample
 [[nodiscard]] inline std::chrono::nanoseconds watch_period(double rate) {
   return std::chrono::nanoseconds(rate > 0 ? std::llround(1e9 / rate) : 0);
 }
 
-/// Something that is watched at its owners: what differs between a path and a partition. WatchLoop
-/// does what they have in common.
+/// Something that is watched at its owners: what differs between a path and a partition.
+/// WatchRounds does what they have in common.
 /// @par Thread safety  All functions are thread-safe; those of rounds are called by one thread.
 class Watched {
  public:
@@ -43,7 +48,7 @@ class Watched {
   virtual ~Watched() = default;
 
   /// Applies pushed values, or a reply. @return whether values are missing, which must be requested
-  virtual bool take(const PushedValues& pushed) = 0;
+  virtual bool take(const PushedValues& pushed, Clock::time_point now) = 0;
   /// Nothing comes any more, as the client has ended.
   virtual void end() = 0;
   /// Whether pushed values suffice for this lookup.
@@ -54,10 +59,14 @@ class Watched {
 
   // --- rounds ---
 
-  /// Plans according to the current structure, and adopts the plan.
-  [[nodiscard]] virtual Result<Plan> plan(const Context& context) = 0;
+  /// The frames that it concerns: a participant that does not keep all asks for them first.
+  [[nodiscard]] virtual std::vector<std::string> frames() const { return {}; }
+  /// Plans with the structure, whose lock is held.
+  [[nodiscard]] virtual Result<void> plan(const KnownStructure& known) = 0;
+  /// Adopts what was planned.
+  [[nodiscard]] virtual Plan adopt(Clock::time_point now) = 0;
   /// There is no plan. @return whether to leave it so until something changes
-  virtual bool on_no_plan(Error why) = 0;
+  virtual bool on_no_plan(Error why, Clock::time_point now) = 0;
   /// Values cannot be received. @return whether to leave it so until the next renewal
   virtual bool on_deaf(Error why) = 0;
   /// An owner has not answered with values. @param why  null: with those of another group

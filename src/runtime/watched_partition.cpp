@@ -7,8 +7,6 @@
 #include "tfdude/base/id.hpp"
 
 #include "partition/routing.hpp"
-#include "runtime/context.hpp"
-#include "runtime/member_runner.hpp"
 
 namespace tfdude {
 namespace {
@@ -52,64 +50,76 @@ WatchedPartition::WatchedPartition(std::string name, double rate, Listener liste
 
 // ---- rounds
 
-Result<Watched::Plan> WatchedPartition::plan(const Context& context) {
-  const std::uint64_t own_incarnation = context.member.incarnation();
-  Frames found;
-  Plan plan;
-  Owner owner = kHeldHere;
-  {
-    Structure& structure = context.structure;
-    const Lock lock(structure.mutex);
-    const auto known = structure.directory.owner(name_);
-    if (!known) return fail(Errc::kUnknownPartition, "no partition " + quote(name_));
-    if (auto ready = route_to(structure.directory, *known, {}); !ready) {
-      return tl::unexpected(std::move(ready.error()));
-    }
-    owner = *known;
-    const auto serving = structure.directory.serving(name_);
-    found.incarnation = owner == kHeldHere ? own_incarnation : serving ? serving->incarnation : 0;
-    for (FrameInfo& frame : structure.forest.frames()) {
-      if (frame.owner != owner) continue;
-      found.frames.push_back({std::move(frame.id), std::move(frame.parent)});
-    }
+Result<void> WatchedPartition::plan(const KnownStructure& known) {
+  const auto owner = known.directory.owner(name_);
+  if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(name_));
+  if (auto ready = route_to(known.directory, *owner, {}); !ready) {
+    return tl::unexpected(std::move(ready.error()));
   }
-  std::sort(found.frames.begin(), found.frames.end(),
+  const auto serving = known.directory.serving(name_);
+  planned_ = {*owner, {}, {}, 0};
+  planned_.incarnation = *owner == kHeldHere ? known.own_incarnation
+                         : serving           ? serving->incarnation
+                                             : 0;
+  for (FrameInfo& frame : known.forest.frames()) {
+    if (frame.owner != *owner) continue;
+    planned_.frames.push_back({std::move(frame.id), std::move(frame.parent)});
+  }
+  return {};
+}
+
+std::vector<Watched::Group> WatchedPartition::group() {
+  std::sort(planned_.frames.begin(), planned_.frames.end(),
             [](const WatchedFrame& a, const WatchedFrame& b) { return a.id < b.id; });
-  for (std::uint32_t i = 0; i < found.frames.size(); ++i) {
-    const WatchedFrame& frame = found.frames[i];
+  std::vector<Watched::Group> groups;
+  for (std::uint32_t i = 0; i < planned_.frames.size(); ++i) {
+    const WatchedFrame& frame = planned_.frames[i];
     if (frame.parent.empty()) continue;
-    if (found.groups.empty() || found.groups.back().frames.size() == most_) {
+    if (groups.empty() || planned_.groups.back().frames.size() == most_) {
       WatchRequest request;
       request.period = period_;
-      found.groups.push_back({});
-      plan.groups.push_back({0, {owner, name_, Request{0, frame.id, request}}});
+      planned_.groups.push_back({});
+      groups.push_back({0, {planned_.owner, name_, Request{0, frame.id, request}}});
     }
-    found.groups.back().frames.push_back(i);
-    auto& request = std::get<WatchRequest>(plan.groups.back().part.request.body);
+    planned_.groups.back().frames.push_back(i);
+    auto& request = std::get<WatchRequest>(groups.back().part.request.body);
     request.segments.push_back({frame.parent, frame.id});
   }
-  for (std::size_t i = 0; i < plan.groups.size(); ++i) {
-    const auto& request = std::get<WatchRequest>(plan.groups[i].part.request.body);
-    plan.groups[i].id = found.groups[i].id = watch_group(name_, found.incarnation, request);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const auto& request = std::get<WatchRequest>(groups[i].part.request.body);
+    groups[i].id = planned_.groups[i].id = watch_group(name_, planned_.incarnation, request);
   }
-  plan.is_new = adopt(found);
+  return groups;
+}
+
+Watched::Plan WatchedPartition::adopt(Clock::time_point /*now*/) {
+  Plan plan{group(), false};
+  plan.is_new = take_over();
   return plan;
 }
 
-bool WatchedPartition::on_no_plan(Error why) {
-  const Lock lock(mutex_);
-  if (std::exchange(reachable_, false)) post({name_, ReachNews{false, std::move(why.message)}});
+bool WatchedPartition::on_no_plan(Error why, Clock::time_point /*now*/) {
+  became_unreachable(std::move(why.message));
   return true;
 }
 
-bool WatchedPartition::on_deaf(Error why) { return on_no_plan(std::move(why)); }
+void WatchedPartition::became_unreachable(std::string why) {
+  const Lock lock(mutex_);
+  if (std::exchange(reachable_, false)) post({name_, ReachNews{false, std::move(why)}});
+}
+
+bool WatchedPartition::on_deaf(Error why) {
+  became_unreachable(std::move(why.message));
+  return true;
+}
 
 bool WatchedPartition::on_denied(const Part& /*part*/, const Error* why) {
   if (why == nullptr) return false;
   // More edges are correlated with others than an answer can have.
   if (why->code == Errc::kInvalidInput && most_ > kMaxCorrelated) most_ = kMaxCorrelated;
   const bool lasts = why->code == Errc::kNotPermitted || why->code == Errc::kTooMuch;
-  return lasts && on_no_plan(*why);
+  if (lasts) became_unreachable(why->message);
+  return lasts;
 }
 
 // ---- news
@@ -123,31 +133,30 @@ void WatchedPartition::post(PartitionNews news, std::size_t values) {
   });
 }
 
-bool WatchedPartition::adopt(const Frames& plan) {
+bool WatchedPartition::take_over() {
   const Lock lock(mutex_);
   if (!std::exchange(reachable_, true)) post({name_, ReachNews{true, {}}});
   const auto is_known = [&](const PlannedGroup& group) TFDUDE_REQUIRES(mutex_) {
     return std::any_of(groups_.begin(), groups_.end(),
                        [&](const Group& one) { return one.id == group.id && !one.outdated; });
   };
-  const bool begins = plan.incarnation != incarnation_;
-  const bool same_groups = std::all_of(plan.groups.begin(), plan.groups.end(), is_known);
-  if (!begins && same_groups && plan.frames == frames_) return false;
+  const bool begins = planned_.incarnation != incarnation_;
+  const bool same_groups = std::all_of(planned_.groups.begin(), planned_.groups.end(), is_known);
+  if (!begins && same_groups && planned_.frames == frames_) return false;
   if (begins) groups_.clear();
-  const bool new_frames = begins || plan.frames != frames_;
-  carry_over(plan);
-  incarnation_ = plan.incarnation;
+  const bool new_frames = begins || planned_.frames != frames_;
+  carry_over();
+  incarnation_ = planned_.incarnation;
   answered_.reset();
   missing_from_ = recent();
-  if (new_frames) post({name_, FramesNews{plan.frames, plan.incarnation}});
+  if (new_frames) post({name_, FramesNews{frames_, incarnation_}});
   return true;
 }
 
-// Keeps what is known of edges that stay, and the groups of before.
-void WatchedPartition::carry_over(const Frames& plan) {
-  std::vector<Known> known(plan.frames.size());
-  if (plan.incarnation == incarnation_) {
-    const std::vector<std::uint32_t> indices = places(frames_, plan.frames);
+void WatchedPartition::carry_over() {
+  std::vector<Known> known(planned_.frames.size());
+  if (planned_.incarnation == incarnation_) {
+    const std::vector<std::uint32_t> indices = places(frames_, planned_.frames);
     for (std::size_t i = 0; i < indices.size(); ++i) {
       if (indices[i] != kGone) known[indices[i]] = std::move(known_[i]);
     }
@@ -159,8 +168,8 @@ void WatchedPartition::carry_over(const Frames& plan) {
     }
   }
   known_ = std::move(known);
-  frames_ = plan.frames;
-  for (const PlannedGroup& group : plan.groups) {
+  frames_ = std::move(planned_.frames);
+  for (const PlannedGroup& group : planned_.groups) {
     const auto before = std::find_if(groups_.begin(), groups_.end(),
                                      [&](const Group& one) { return one.id == group.id; });
     Group fresh{group, ReceivedGroup(group.frames.size()), false};
@@ -215,7 +224,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   if (begins) values.back().begins = entry.process_noise;
 }
 
-bool WatchedPartition::take(const PushedValues& pushed) {
+bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   const Lock lock(mutex_);
   const auto group = std::find_if(groups_.begin(), groups_.end(),
                                   [&](const Group& one) { return one.id == pushed.group; });
@@ -238,7 +247,7 @@ bool WatchedPartition::take(const PushedValues& pushed) {
   if (count > 0) post({name_, std::move(news)}, count);
   if (lacks_any()) return true;
   missing_from_.reset();
-  if (settles(Clock::now())) missing_from_ = recent();
+  if (settles(now)) missing_from_ = recent();
   return false;
 }
 

@@ -43,14 +43,15 @@ class WatchedPartition final : public Watched {
   WatchedPartition(std::string name, double rate, Listener listener,
                    std::shared_ptr<Callbacks::Line> line);
 
-  bool take(const PushedValues& pushed) override;
+  bool take(const PushedValues& pushed, Clock::time_point now) override;
   /// The listener is not running and will not run, unless it calls this itself.
   void end() override { line_->close(); }
 
   // --- for the rounds, from one thread ---
 
-  [[nodiscard]] Result<Plan> plan(const Context& context) override;
-  bool on_no_plan(Error why) override;
+  [[nodiscard]] Result<void> plan(const KnownStructure& known) override;
+  [[nodiscard]] Plan adopt(Clock::time_point now) override;
+  bool on_no_plan(Error why, Clock::time_point now) override;
   bool on_deaf(Error why) override;
   bool on_denied(const Part& part, const Error* why) override;
   /// Also because DDS may not have matched the readers yet.
@@ -79,10 +80,11 @@ class WatchedPartition final : public Watched {
     ReceivedGroup received;
     bool outdated = false;
   };
-  struct Frames {
-    std::uint64_t incarnation = 0;
+  struct Planned {
+    Owner owner = kHeldHere;
     std::vector<WatchedFrame> frames;
     std::vector<PlannedGroup> groups;
+    std::uint64_t incarnation = 0;
   };
   // How a message continues what is known.
   struct Message {
@@ -91,15 +93,19 @@ class WatchedPartition final : public Watched {
     std::uint64_t commit = 0;
   };
 
-  /// The owner is reachable and has these frames. @return whether they or the groups are new
-  [[nodiscard]] bool adopt(const Frames& plan);
+  /// Groups the edges of the planned frames.
+  [[nodiscard]] std::vector<Watched::Group> group();
+  /// The owner is reachable and has the planned frames. @return whether they or the groups are new
+  [[nodiscard]] bool take_over();
   // Appends the value if it is news.
   void admit(const Group& group, PushedValue& entry, const Message& message,
              std::vector<WatchedValue>& values) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool lacks_any() const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool settles(Clock::time_point now) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Time> recent() const TFDUDE_REQUIRES(mutex_);
-  void carry_over(const Frames& plan) TFDUDE_REQUIRES(mutex_);
+  /// Keeps what is known of edges that stay in the plan, and the groups of before.
+  void carry_over() TFDUDE_REQUIRES(mutex_);
+  void became_unreachable(std::string why);
   void post(PartitionNews news, std::size_t values = 0);
 
   const std::string name_;
@@ -108,7 +114,9 @@ class WatchedPartition final : public Watched {
   const std::shared_ptr<std::atomic<std::size_t>> waiting_ =
       std::make_shared<std::atomic<std::size_t>>(0);
   const std::shared_ptr<Callbacks::Line> line_;
-  std::size_t most_ = kMaxItems;  // edges in a group; belongs to the rounds
+  // The following belong to the rounds.
+  std::size_t most_ = kMaxItems;  // edges in a group
+  Planned planned_;               // until it is adopted
   mutable Mutex mutex_{LockRank::kWatchedPath};
   bool reachable_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::uint64_t incarnation_ TFDUDE_GUARDED_BY(mutex_) = 0;

@@ -5,9 +5,6 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
-#include "runtime/context.hpp"
-#include "runtime/member_runner.hpp"
-#include "runtime/requests.hpp"
 #include "tree/epoch.hpp"
 
 namespace tfdude {
@@ -125,7 +122,7 @@ bool WatchedPath::follows(const WatchRoute& route) const {
   return latest != nullptr && latest->route().is_same(route);
 }
 
-bool WatchedPath::prepare(WatchRoute route) {
+bool WatchedPath::prepare(WatchRoute route, Clock::time_point now) {
   bool shown = false;
   {
     const Lock lock(mutex_);
@@ -134,15 +131,15 @@ bool WatchedPath::prepare(WatchRoute route) {
     // The path returned to its route before the other one was shown.
     if (followed_ != nullptr && followed_->route().is_same(route)) return false;
     next_ = std::make_unique<WatchMirror>(a_, b_, std::move(route), options_.timing);
-    next_since_ = Clock::now();
+    next_since_ = now;
     if (followed_ != nullptr) next_->inherit(*followed_);
-    shown = swap_if_ready();
+    shown = swap_if_ready(now);
   }
   tell();
   return shown;
 }
 
-bool WatchedPath::take(const PushedValues& pushed) {
+bool WatchedPath::take(const PushedValues& pushed, Clock::time_point now) {
   bool is_new = false;
   bool rerouted = false;
   bool lacks = false;
@@ -153,7 +150,7 @@ bool WatchedPath::take(const PushedValues& pushed) {
       remember_newest();
     }
     if (next_ != nullptr && next_->take(pushed)) is_new = true;
-    rerouted = swap_if_ready();
+    rerouted = swap_if_ready(now);
     const WatchMirror* latest = this->latest();
     lacks = (latest != nullptr && latest->lacks()) || skipped_from();
     if (is_new) messages_.fetch_add(1, std::memory_order_relaxed);
@@ -185,12 +182,11 @@ void WatchedPath::hold(std::unique_ptr<const StampedTransform> X) {
 }
 
 // Shown values must not be older than those shown before.
-bool WatchedPath::swap_if_ready() {
+bool WatchedPath::swap_if_ready(Clock::time_point now) {
   if (next_ == nullptr || !next_->complete()) return false;
   if (followed_ != nullptr) {
     if (next_->is_behind(*followed_)) return false;
-    if (lacks_common(next_->lookup({})) && Clock::now() - next_since_ < kWaitForCommon)
-      return false;
+    if (lacks_common(next_->lookup({})) && now - next_since_ < kWaitForCommon) return false;
   }
   show(std::move(next_));
   remember_newest();
@@ -270,38 +266,39 @@ std::set<std::uint64_t> WatchedPath::groups(Clock::time_point /*now*/) {
 
 // ---- rounds
 
-Result<WatchRoute> WatchedPath::route(const Context& context) const {
-  const std::uint64_t own_incarnation = context.member.incarnation();
-  // If nobody can say whether the route is still right, the known one must do.
-  const auto names = frames_.empty() ? std::vector<std::string>{a_, b_} : frames_;
-  const auto known = context.requests.know(names, Task::kFresh, Deadline(context.options.timeout));
-  const auto period = watch_period(options_.rate);
-  Structure& structure = context.structure;
-  const Lock lock(structure.mutex);
-  auto route = frames_.empty() ? watch_route(structure.forest, structure.directory, a_, b_,
-                                             options_.composed, period, own_incarnation)
-                               : watch_route(structure.forest, structure.directory, frames_, period,
-                                             own_incarnation);
-  if (!route && !known) return tl::unexpected(known.error());
-  return route;
+std::vector<std::string> WatchedPath::frames() const {
+  return frames_.empty() ? std::vector<std::string>{a_, b_} : frames_;
 }
 
-Result<Watched::Plan> WatchedPath::plan(const Context& context) {
-  collect();
-  auto route = this->route(context);
+Result<WatchRoute> WatchedPath::route(const KnownStructure& known) const {
+  const auto& [forest, directory, own_incarnation] = known;
+  const auto period = watch_period(options_.rate);
+  if (!frames_.empty()) return watch_route(forest, directory, frames_, period, own_incarnation);
+  return watch_route(forest, directory, a_, b_, options_.composed, period, own_incarnation);
+}
+
+Result<void> WatchedPath::plan(const KnownStructure& known) {
+  auto route = this->route(known);
   if (!route) return tl::unexpected(std::move(route.error()));
+  planned_ = *std::move(route);
+  return {};
+}
+
+Watched::Plan WatchedPath::adopt(Clock::time_point now) {
+  collect();
   planned();
-  Plan plan{{}, !follows(*route)};
-  for (std::size_t i = 0; i < route->parts.size(); ++i) {
-    plan.groups.push_back({route->sources[i].group, route->parts[i]});
+  Plan plan{{}, !follows(planned_)};
+  for (std::size_t i = 0; i < planned_.parts.size(); ++i) {
+    plan.groups.push_back({planned_.sources[i].group, planned_.parts[i]});
   }
-  if (plan.is_new && prepare(*std::move(route))) report_rerouted();
+  if (plan.is_new && prepare(std::move(planned_), now)) report_rerouted();
   return plan;
 }
 
-bool WatchedPath::on_no_plan(Error why) {
+bool WatchedPath::on_no_plan(Error why, Clock::time_point now) {
+  collect();
   const bool was_live = live();
-  if (was_live && !is_gone(why, Clock::now())) {
+  if (was_live && !is_gone(why, now)) {
     // Known values are still returned, with their stamps; the owner may return.
     const bool may_return = why.code == Errc::kUnreachable;
     set_health(tl::unexpected(std::move(why)));

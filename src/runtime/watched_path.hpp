@@ -64,14 +64,13 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
 
   [[nodiscard]] const std::string& a() const { return a_; }
   [[nodiscard]] const std::string& b() const { return b_; }
-  [[nodiscard]] const std::vector<std::string>& frames() const { return frames_; }
   [[nodiscard]] const WatchOptions& options() const { return options_; }
   /// For messages: "path from 'a' to 'b'".
   [[nodiscard]] std::string described() const;
   /// The current route. @return as Client::lookup()
-  [[nodiscard]] Result<WatchRoute> route(const Context& context) const;
+  [[nodiscard]] Result<WatchRoute> route(const KnownStructure& known) const;
 
-  bool take(const PushedValues& pushed) override;
+  bool take(const PushedValues& pushed, Clock::time_point now) override;
   void end() override;
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const override {
@@ -80,8 +79,10 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
 
   // --- for the rounds, from one thread ---
 
-  [[nodiscard]] Result<Plan> plan(const Context& context) override;
-  bool on_no_plan(Error why) override;
+  [[nodiscard]] std::vector<std::string> frames() const override;
+  [[nodiscard]] Result<void> plan(const KnownStructure& known) override;
+  [[nodiscard]] Plan adopt(Clock::time_point now) override;
+  bool on_no_plan(Error why, Clock::time_point now) override;
   bool on_deaf(Error why) override;
   bool on_denied(const Part& part, const Error* why) override;
   /// An owner that has returned has to send its values first: until then old ones are shown.
@@ -93,11 +94,21 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
   [[nodiscard]] unsigned periods() const override { return 1; }
 
+ private:
+  struct Listeners {
+    Mutex mutex;
+    std::list<Listener> all TFDUDE_GUARDED_BY(mutex);
+  };
+  struct Retired {
+    std::uint64_t tag;
+    std::shared_ptr<const void> object;
+  };
+
   [[nodiscard]] bool live() const { return shown_.load(std::memory_order_acquire) != nullptr; }
   /// Whether the path uses this route, or is about to.
   [[nodiscard]] bool follows(const WatchRoute& route) const;
   /// Prepares another route. @return whether it is shown already, as it needs no values
-  bool prepare(WatchRoute route);
+  bool prepare(WatchRoute route, Clock::time_point now);
   /// Whether the route is shown with all values of its owners, as far as they are available.
   [[nodiscard]] bool up_to_date() const;
   /// Sets the reason why there is no answer for now.
@@ -109,17 +120,6 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   void planned();
   /// Frees mirrors that have no readers any more.
   void collect();
-
- private:
-  struct Listeners {
-    Mutex mutex;
-    std::list<Listener> all TFDUDE_GUARDED_BY(mutex);
-  };
-  struct Retired {
-    std::uint64_t tag;
-    std::shared_ptr<const void> object;
-  };
-
   /// Whether the pushed values suffice for this query.
   [[nodiscard]] bool has_data(const Query& query) const;
   /// The mirror that takes values: of the next route, if there is one. Null: there is none.
@@ -133,7 +133,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   void set_health(Result<void> health);
   void report(std::string what);
   void report_rerouted();
-  [[nodiscard]] bool swap_if_ready() TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool swap_if_ready(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
   /// Tells all who wait that something is new.
   void tell();
@@ -150,6 +150,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
   const std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
+  WatchRoute planned_;                           // until it is adopted; belongs to the rounds
   mutable Condition changed_;                    // of messages_, shown_
   mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);

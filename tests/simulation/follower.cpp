@@ -79,6 +79,7 @@ void Follower::restart() {
   bases_ = ever_ = {base};
   written_ = {{bases_}};
   newest_read_ = 0;
+  shown_base_.reset();
   incarnation_ = 0;
   may_go_back_ = false;
   applied_ = stored_ = floor_ = 0;
@@ -103,9 +104,8 @@ void Follower::add_tip() {
       [this](const Result<void>& added) {
         arm_added_ = false;
         if (!added) return;
-        watch_ = std::make_shared<Watch>(*process_, "world", tip(), [this] { look(); });
-        process_->watch(watch_);
-        watch_->start();
+        watch_ = std::make_shared<WatchedPath>("world", tip(), WatchOptions());
+        process_->watch(watch_, [this] { look(); });
       });
 }
 
@@ -200,12 +200,12 @@ void Follower::move() {
 
 Result<StampedTransform> Follower::read() const {
   if (watch_ == nullptr) return fail(Errc::kUnknownEnd, "nothing is watched");
-  return watch_->read();
+  return watch_->lookup({});
 }
 
 void Follower::look() {
   if (watch_ == nullptr) return;
-  if (const auto X = watch_->read()) judge(*X);
+  if (const auto X = watch_->lookup({})) judge(*X);
 }
 
 // Values that were not stored yet are lost with their owner's process: the next process may have
@@ -265,6 +265,8 @@ void Follower::judge(const StampedTransform& X) {
     world.trace(tip() + ": sees value " + std::to_string(number) + " below " + base_of(base));
   }
   newest_read_ = number;
+  if (shown_base_ && *shown_base_ != base) world.count("a watched path took another route");
+  shown_base_ = base;
 }
 
 }  // namespace tfdude::simulation

@@ -4,12 +4,12 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "simulation/process.hpp"
-#include "simulation/watch.hpp"
 
 namespace tfdude::simulation {
 
@@ -43,7 +43,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   [[nodiscard]] Result<StampedTransform> read() const;
   /// The groups of watchers that it belongs to.
   [[nodiscard]] std::set<std::uint64_t> groups() const {
-    return watch_ != nullptr ? watch_->groups() : std::set<std::uint64_t>();
+    return watch_ != nullptr ? watch_->groups({}) : std::set<std::uint64_t>();
   }
 
  private:
@@ -79,7 +79,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   const std::size_t actor_;
   const std::size_t owners_;
   testing::Random random_;  // of the current step
-  std::shared_ptr<Watch> watch_;
+  std::shared_ptr<WatchedPath> watch_;
   std::string partition_;
   bool arm_added_ = false;        // and not the tip yet
   int generation_ = 0;            // of the two frames
@@ -87,6 +87,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   std::set<std::size_t> ever_;    // below which they may have been
   std::vector<Written> written_;  // by the number of the value
   std::size_t newest_read_ = 0;
+  std::optional<std::size_t> shown_base_;
   std::uint64_t incarnation_ = 0;  // of the owner
   bool may_go_back_ = false;       // once, since the owner was started again
   std::size_t applied_ = 0;        // the newest value that the owner is known to have

@@ -50,7 +50,8 @@ Process::Process(Surroundings& world, Setting setting)
           [this] {
             later("push", kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); });
           },
-          [this](const PushedValues& pushed) { push(pushed); }) {
+          [this](const PushedValues& pushed) { push(pushed); }),
+      watches_(*this) {
   directory_.changes().watch();
 }
 
@@ -266,10 +267,12 @@ void Process::react() {
   if (outcome.lost) replies_.on_lost(*outcome.lost);
   const auto calls = calls_;
   for (const auto& one : calls) one->go_on();
+  watches_.go_on();
   calls_.erase(
       std::remove_if(calls_.begin(), calls_.end(), [](const auto& one) { return one->over(); }),
       calls_.end());
   if (outcome.gave_up) ended_ = true;
+  if (outcome.routes) watches_.look_again();
   tell_planned(outcome);
   count(outcome);
 }

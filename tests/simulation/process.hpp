@@ -22,7 +22,7 @@
 #include "simulation/pushes.hpp"
 #include "simulation/running_call.hpp"
 #include "simulation/steps.hpp"
-#include "simulation/watch.hpp"
+#include "simulation/watches.hpp"
 #include "transport/silence.hpp"
 #include "tree/forest.hpp"
 
@@ -128,8 +128,11 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
                           [update](Process& there) { there.on_update(update); });
     });
   }
-  /// From now on it gets the input for watched paths.
-  void watch(const std::shared_ptr<Watch>& watch) { watches_.push_back(watch); }
+  /// Watches a path while it has another holder.
+  /// @param shown  called when its value may have changed
+  void watch(const std::shared_ptr<WatchedPath>& path, std::function<void()> shown) {
+    watches_.add(path, std::move(shown));
+  }
   /// From now on it is told what may change its plan.
   void keep_planned(const std::shared_ptr<Planned>& planned) { planned_.push_back(planned); }
   /// Tells the owner of a partition that a group of watchers has one more member.
@@ -224,10 +227,10 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
   std::vector<std::shared_ptr<RunningCall>> calls_;
   std::map<std::uint32_t, std::uint64_t> replied_;  // by whom, by the numbers of requests
   SharedHints hints_;
-  std::vector<std::weak_ptr<Watch>> watches_;
   std::vector<std::weak_ptr<Planned>> planned_;
   std::uint64_t told_structure_ = 0;
   Pushes pushes_;
+  Watches watches_;
   std::uint64_t pushed_ = 0;
   std::vector<std::function<void()>> backlog_;
   std::vector<std::function<void(const Result<void>&)>> waiting_;

@@ -42,9 +42,7 @@ void Process::on_reply(std::uint64_t from, const std::string& partition, const R
   replies_.on_reply(partition, reply);
   const auto calls = calls_;
   for (const auto& one : calls) one->go_on();
-  for (const auto& one : watches_) {
-    if (const auto watch = one.lock()) watch->go_on();
-  }
+  watches_.go_on();
 }
 
 void Process::answer_watch(std::uint64_t from, const Request& request) {
@@ -92,9 +90,7 @@ void Process::push(const PushedValues& pushed) {
 
 void Process::on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed) {
   world_.steps.mix(pushed.group + pushed.commit);
-  for (const auto& one : watches_) {
-    if (const auto watch = one.lock()) watch->on_pushed(from, number, pushed);
-  }
+  watches_.on_pushed(from, number, pushed);
 }
 
 void Process::on_watcher(std::uint64_t group) { pushes_.tell_all(group); }

@@ -89,6 +89,7 @@ void Sampler::add() {
         }),
         [this](const Result<void>& added) {
           added_ = added.has_value();
+          if (added_) watch();
           next();
         });
 }
@@ -170,6 +171,42 @@ void Sampler::look_up(std::optional<Time> at, bool last) {
           }
           if (!last) next();
         });
+}
+
+void Sampler::watch() {
+  watch_ = std::make_shared<WatchedPath>(base_, frame(), WatchOptions());
+  shown_groups_.clear();
+  process_->watch(watch_, [this, id = frame()] {
+    if (id == frame()) look_at_watch();
+  });
+}
+
+// Each process of the owner has a group of its own, which begins with its answer.
+void Sampler::look_at_watch() {
+  auto groups = watch_->lookup({}) ? watch_->groups({}) : std::set<std::uint64_t>();
+  if (groups == shown_groups_) return;
+  shown_groups_ = std::move(groups);
+  watched_from_ = samples_.size();
+}
+
+void Sampler::check_watch(const Forest& owner) {
+  Surroundings& world = process_->world();
+  std::vector<EdgeCursor> all{{frame(), base_}};
+  for (const PushedValue& kept : owner.values_since(all, {false, Time()}).values) {
+    const auto number = static_cast<std::size_t>(std::lround(kept.X.pose.translation().y()));
+    if (!kept.stamp || number < watched_from_ || samples_.came_late(number)) continue;
+    world.count("watched samples checked");
+    Query query;
+    query.at = kept.stamp;
+    const auto X = watch_->lookup(query);
+    const std::string what = frame() + ": sample " + std::to_string(number) + ": ";
+    if (!X) {
+      world.violation("a watch misses a sample", what + X.error().message);
+    } else if (std::abs(X->pose.translation().y() - static_cast<double>(number)) > 1e-6) {
+      world.violation("a watch misses a sample",
+                      what + "value " + std::to_string(X->pose.translation().y()));
+    }
+  }
 }
 
 void Sampler::see(double value) {

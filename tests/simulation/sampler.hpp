@@ -16,7 +16,8 @@
 namespace tfdude::simulation {
 
 /// A client that writes stamped samples of a frame of its own, by requests and by a stream, in
-/// order and late, with a clock that jumps back; and that looks them up at instants.
+/// order and late, with a clock that jumps back; and that looks them up at instants, and watches
+/// them.
 class Sampler : public std::enable_shared_from_this<Sampler> {
  public:
   /// @param actor  the number by which its operations are counted
@@ -37,6 +38,13 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   [[nodiscard]] std::string frame() const;
   /// Looks at the newest value, and at the last samples, in the end. There must be an answer.
   void look_back();
+  /// The watch must have every sample that the owner has, of those in order that were sent since it
+  /// began: an owner does not repeat late ones whose push was lost.
+  void check_watch(const Forest& owner);
+  /// The groups of watchers that it belongs to.
+  [[nodiscard]] std::set<std::uint64_t> groups() const {
+    return watch_ != nullptr ? watch_->groups({}) : std::set<std::uint64_t>();
+  }
 
  private:
   using Then = RunningCall::Then;
@@ -50,6 +58,8 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   void look_up(std::optional<Time> at, bool last);
   void begin(const std::string& what, const std::shared_ptr<Task>& task, Then then);
   void see(double value);
+  void watch();
+  void look_at_watch();
   void check(const Samples::Broken& broken);
   [[nodiscard]] std::vector<EdgeUpdate> edge(std::size_t number) const;
   [[nodiscard]] Time any_instant();
@@ -61,7 +71,10 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   testing::Random random_;  // of the current step
   Samples samples_;
   std::set<std::size_t> streamed_;  // their numbers
-  bool late_ = false;               // the current one
+  std::shared_ptr<WatchedPath> watch_;
+  std::set<std::uint64_t> shown_groups_;  // empty: it shows nothing
+  std::size_t watched_from_ = 0;          // the first sample that was sent since
+  bool late_ = false;                     // the current one
   std::string base_;
   std::string partition_;
   bool added_ = false;

@@ -45,6 +45,13 @@ bool Samples::era_is_taken() const {
                      [this](const Sample& one) { return one.era == era_ && one.taken_by != 0; });
 }
 
+bool Samples::came_late(std::size_t number) const {
+  const auto sent = samples_.begin() + static_cast<std::ptrdiff_t>(number);
+  return std::any_of(samples_.begin(), sent, [&](const Sample& one) {
+    return one.era == sent->era && one.stamp > sent->stamp;
+  });
+}
+
 // ---- what a process has
 
 // The latest one of which it certainly had a sample.

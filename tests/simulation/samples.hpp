@@ -40,6 +40,9 @@ class Samples {
   [[nodiscard]] bool era_is_taken() const;
   [[nodiscard]] Time stamp(std::size_t number) const { return samples_[number].stamp; }
 
+  /// Whether a sample of this era with a later stamp was sent before.
+  [[nodiscard]] bool came_late(std::size_t number) const;
+
   /// A process has taken a sample.
   [[nodiscard]] Broken taken(std::size_t number, std::uint64_t by);
   /// A process has rejected a sample.

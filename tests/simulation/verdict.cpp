@@ -138,6 +138,7 @@ void Verdict::check_kept_by_owner(Process& owner) {
   }
   std::set<std::uint64_t> watched;
   for (const auto& follower : cast_.followers) watched.merge(follower->groups());
+  for (const auto& sampler : cast_.samplers) watched.merge(sampler->groups());
   for (const std::uint64_t group : owner.pushed_groups()) {
     if (watched.count(group) == 0) grows(" pushes to a group that nobody watches");
   }
@@ -282,6 +283,7 @@ void Verdict::check_samplers() {
     const auto base = frame ? sampler->process().forest().info(frame->parent) : std::nullopt;
     if (!base || !hears_all(sampler->process())) continue;
     sampler->look_back();
+    sampler->check_watch(owner->forest());
     calls_.count("sampled edges checked", 1);
   }
 }
