@@ -61,6 +61,11 @@ struct Errors {
   const CommonErrors& common_errors_2;
 };
 
+bool any_subtracts(const CommonErrors& common_errors) {
+  return std::any_of(common_errors.begin(), common_errors.end(),
+                     [](const CommonError& one) { return one.subtracts; });
+}
+
 // Of own parts and common errors.
 Covariance whole(const Covariance& own, const CommonErrors& common_errors) {
   if (common_errors.empty()) return own;
@@ -91,6 +96,7 @@ Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
     terms.joint = J_12.data();
   }
   kernel::functions().add_fourth(terms);
+  const bool subtracts = any_subtracts(e.common_errors_1) || any_subtracts(e.common_errors_2);
   const auto carried = [&](std::size_t i, CommonErrors errors) {
     if (errors.empty()) return errors;
     return product(Matrix6d::Identity() + derivative(terms, i), std::move(errors));
@@ -99,7 +105,8 @@ Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
   common_errors = carried(0, std::move(e.common_errors_1));
   add_errors(carried(1, e.common_errors_2), common_errors);
   const Covariance sum = Covariance::trusted(series);
-  if (is_semidefinite(sum)) return sum;
+  // Columns that subtract cancel own parts. So these must go the same way, with that term, too.
+  if (!subtracts && is_semidefinite(sum)) return sum;
   const auto sixth = [&](std::size_t i, const Covariance& own) {
     const Matrix6d D = derivative(terms, i);
     return Covariance::trusted(Matrix6d(D * own.matrix() * D.transpose()));
