@@ -5,9 +5,11 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/bound_weights.hpp"
 #include "math/common_errors.hpp"
 #include "math/kernel.hpp"
 #include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -114,6 +116,23 @@ Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
   return sum + sixth(0, e.own_1) + sixth(1, e.own_2);
 }
 
+// Of own parts and common errors of which some subtract.
+Matrix6d difference(const Covariance& own, const CommonErrors& common_errors) {
+  Matrix6d sum = own.matrix();
+  Twist variances = sum.diagonal();
+  for (const CommonError& one : common_errors) variances += one.loading.rowwise().squaredNorm();
+  sum += second_moment(common_errors);
+  if (is_clear_difference(Covariance::trusted(sum), variances)) return sum;
+  Loading adds = root_of(own.matrix());
+  Loading subtracts(6, 0);
+  for (const CommonError& one : common_errors) {
+    Loading& side = one.subtracts ? subtracts : adds;
+    side = joined(side, one.loading);
+  }
+  const Loading root = root_of_difference(adds, subtracts);
+  return root * root.transpose();
+}
+
 }  // namespace
 
 void add_errors(const CommonErrors& more, CommonErrors& sum) {
@@ -170,14 +189,16 @@ Transform collapse(const Belief& X_AB) {
   Covariance known = X_AB.own;
   if (!X_AB.common_errors.empty()) {
     known = Covariance::trusted(
-        nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
+        any_subtracts(X_AB.common_errors)
+            ? difference(X_AB.own, X_AB.common_errors)
+            : nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
   }
   StatedCovariance stated = X_AB.unknown ? bound(known, *X_AB.unknown) : known;
   stated.set_complete(!X_AB.unspecified);
   return {X_AB.pose, stated};
 }
 
-Covariance bound(const Covariance& A, const Covariance& B) {
+BoundWeights bound_weights(const Covariance& A, const Covariance& B) {
   const auto trace = [](const Covariance& S, std::size_t first) {
     double sum = 0;
     for (std::size_t i = first; i < first + 3; ++i) sum += S.upper()[upper_index(i, i)];
@@ -192,11 +213,16 @@ Covariance bound(const Covariance& A, const Covariance& B) {
     a += of_a / (of_a + of_b);
     b += of_b / (of_a + of_b);
   }
-  if (a <= 0 || b <= 0) return A + B;
+  if (a <= 0 || b <= 0) return {1.0, 1.0};
   const double root = std::sqrt(b / a);
+  return {1.0 + root, 1.0 + 1.0 / root};
+}
+
+Covariance bound(const Covariance& A, const Covariance& B) {
+  const BoundWeights weights = bound_weights(A, B);
   Covariance::Upper sum{};
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    sum[i] = (1.0 + root) * A.upper()[i] + (1.0 + 1.0 / root) * B.upper()[i];
+    sum[i] = weights.of_A * A.upper()[i] + weights.of_B * B.upper()[i];
   }
   return Covariance::trusted(sum);
 }

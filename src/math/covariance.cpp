@@ -14,10 +14,12 @@
 namespace tfdude {
 namespace {
 
-// What counts as rounding, for the matrix scaled to a unit diagonal, so that metres and radians of
-// very different size are treated alike: how far two mirrored elements may differ, and how far below
-// zero an eigenvalue may be. Rounding to float32 moves an element by 6e-8 of it.
+// What counts as rounding, relative to the size of the matrix when it is scaled to a unit diagonal,
+// so that metres and radians of very different size are treated alike: negative eigenvalues as far
+// below zero as this share of the largest. Rounding to float32 moves an element by 6e-8 of it.
 constexpr double kTolerance = 1e-6;
+// Of an element, as the largest eigenvalue is at most 6 then.
+constexpr double kElementTolerance = 6 * kTolerance;
 // Each axis is scaled as if it had at least this share of the largest variance in metres (in
 // radians). A matrix that was computed is semi-definite up to rounding of that largest variance
 // (here 1e-12 of it). An axis that is known exactly, up to rounding, must not be judged by its
@@ -48,7 +50,7 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
       if (i == j || m(i, j) == 0) continue;
       const bool zero_variance = scale[i] == 0 || scale[j] == 0;
       const double correlation = m(i, j) * scale[i] * scale[j];
-      if (zero_variance || !(std::abs(correlation) <= 1.0 + kTolerance)) {
+      if (zero_variance || !(std::abs(correlation) <= 1.0 + kElementTolerance)) {
         return fail(Errc::kInvalidInput,
                     element(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) +
                         " is larger than its variances allow: not positive semi-definite");
@@ -67,7 +69,7 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   if (auto ok = scale_to_unit_diagonal(unit, scale); !ok) return tl::unexpected(ok.error());
   const SymmetricEigen eigen = symmetric_eigen(unit);
   const double smallest = eigen.values[0];
-  if (!(smallest >= -kTolerance)) {
+  if (!(smallest >= -kTolerance * eigen.values[5])) {
     return fail(Errc::kInvalidInput,
                 "covariance is not positive semi-definite: the smallest eigenvalue "
                 "of its correlation matrix is " +
@@ -90,7 +92,7 @@ Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
       const auto column = static_cast<Eigen::Index>(j);
       const double above = matrix(row, column);
       const double below = matrix(column, row);
-      if (std::abs(above - below) > kTolerance * size[row] * size[column]) {
+      if (std::abs(above - below) > kElementTolerance * size[row] * size[column]) {
         return fail(Errc::kInvalidInput, element(i, j) + " and " + element(j, i) +
                                              " differ: the covariance is not symmetric");
       }
