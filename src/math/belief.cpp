@@ -5,9 +5,11 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/bound_weights.hpp"
 #include "math/common_errors.hpp"
 #include "math/kernel.hpp"
 #include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -61,6 +63,11 @@ struct Errors {
   const CommonErrors& common_errors_2;
 };
 
+bool any_subtracts(const CommonErrors& common_errors) {
+  return std::any_of(common_errors.begin(), common_errors.end(),
+                     [](const CommonError& one) { return one.subtracts; });
+}
+
 // Of own parts and common errors.
 Covariance whole(const Covariance& own, const CommonErrors& common_errors) {
   if (common_errors.empty()) return own;
@@ -91,6 +98,7 @@ Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
     terms.joint = J_12.data();
   }
   kernel::functions().add_fourth(terms);
+  const bool subtracts = any_subtracts(e.common_errors_1) || any_subtracts(e.common_errors_2);
   const auto carried = [&](std::size_t i, CommonErrors errors) {
     if (errors.empty()) return errors;
     return product(Matrix6d::Identity() + derivative(terms, i), std::move(errors));
@@ -99,12 +107,30 @@ Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
   common_errors = carried(0, std::move(e.common_errors_1));
   add_errors(carried(1, e.common_errors_2), common_errors);
   const Covariance sum = Covariance::trusted(series);
-  if (is_semidefinite(sum)) return sum;
+  // Columns that subtract cancel own parts. So these must go the same way, with that term, too.
+  if (!subtracts && is_semidefinite(sum)) return sum;
   const auto sixth = [&](std::size_t i, const Covariance& own) {
     const Matrix6d D = derivative(terms, i);
     return Covariance::trusted(Matrix6d(D * own.matrix() * D.transpose()));
   };
   return sum + sixth(0, e.own_1) + sixth(1, e.own_2);
+}
+
+// Of own parts and common errors of which some subtract.
+Matrix6d difference(const Covariance& own, const CommonErrors& common_errors) {
+  Matrix6d sum = own.matrix();
+  Twist variances = sum.diagonal();
+  for (const CommonError& one : common_errors) variances += one.loading.rowwise().squaredNorm();
+  sum += second_moment(common_errors);
+  if (is_clear_difference(Covariance::trusted(sum), variances)) return sum;
+  Loading adds = root_of(own.matrix());
+  Loading subtracts(6, 0);
+  for (const CommonError& one : common_errors) {
+    Loading& side = one.subtracts ? subtracts : adds;
+    side = joined(side, one.loading);
+  }
+  const Loading root = root_of_difference(adds, subtracts);
+  return root * root.transpose();
 }
 
 }  // namespace
@@ -163,14 +189,16 @@ Transform collapse(const Belief& X_AB) {
   Covariance known = X_AB.own;
   if (!X_AB.common_errors.empty()) {
     known = Covariance::trusted(
-        nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
+        any_subtracts(X_AB.common_errors)
+            ? difference(X_AB.own, X_AB.common_errors)
+            : nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
   }
   StatedCovariance stated = X_AB.unknown ? bound(known, *X_AB.unknown) : known;
   stated.set_complete(!X_AB.unspecified);
   return {X_AB.pose, stated};
 }
 
-Covariance bound(const Covariance& A, const Covariance& B) {
+BoundWeights bound_weights(const Covariance& A, const Covariance& B) {
   const auto trace = [](const Covariance& S, std::size_t first) {
     double sum = 0;
     for (std::size_t i = first; i < first + 3; ++i) sum += S.upper()[upper_index(i, i)];
@@ -185,11 +213,16 @@ Covariance bound(const Covariance& A, const Covariance& B) {
     a += of_a / (of_a + of_b);
     b += of_b / (of_a + of_b);
   }
-  if (a <= 0 || b <= 0) return A + B;
+  if (a <= 0 || b <= 0) return {1.0, 1.0};
   const double root = std::sqrt(b / a);
+  return {1.0 + root, 1.0 + 1.0 / root};
+}
+
+Covariance bound(const Covariance& A, const Covariance& B) {
+  const BoundWeights weights = bound_weights(A, B);
   Covariance::Upper sum{};
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    sum[i] = (1.0 + root) * A.upper()[i] + (1.0 + 1.0 / root) * B.upper()[i];
+    sum[i] = weights.of_A * A.upper()[i] + weights.of_B * B.upper()[i];
   }
   return Covariance::trusted(sum);
 }

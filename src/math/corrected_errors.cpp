@@ -2,25 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 #include "math/low_rank.hpp"
 #include "math/semidefinite.hpp"
-#include "math/symmetric_eigen.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
-
-// L with L Lᵀ = A⁺.
-Matrix6d inverse_root(const Matrix6d& semidefinite) {
-  const SymmetricEigen eigen = symmetric_eigen(pseudo_inverse(semidefinite));
-  return eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
-}
 
 // The joint covariance of all edges, six rows each: own parts, and columns that are added to it or
 // subtracted from it.
@@ -64,11 +60,15 @@ class JointCovariance {
         .squaredNorm();
   }
 
+  [[nodiscard]] bool empty() const { return columns_.cols() == 0; }
+
   // Writes the same joint covariance with few columns, as common errors of new sources. All edges
-  // that share the sources are here.
+  // that share the sources are here. Columns with signs keep the most digits, so they are kept while
+  // there are few.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Signed own = with_signs();
     const Eigen::Index count = own.less.cols() + own.more.cols();
+    if (count <= kMaxLoadingColumns) return give_with_signs(edges, name, own);
     auto hubs = by_hubs(dense(edges), rounding(edges), std::min(count, kMostColumns));
     if (!hubs) return give_with_signs(edges, name, own);
     for (std::size_t i = 0; i < edges.size(); ++i) {
@@ -89,16 +89,20 @@ class JointCovariance {
     Matrix more;
   };
 
+  // Each row is scaled to one before, so that no edge and no unit is judged by another.
   [[nodiscard]] Signed with_signs() const {
-    const Eigen::HouseholderQR<Matrix> qr(columns_);
+    const Eigen::VectorXd size = columns_.rowwise().norm();
+    const Eigen::VectorXd unit =
+        size.unaryExpr([](double one) { return one > 0 ? 1.0 / one : 0.0; });
+    const Eigen::HouseholderQR<Matrix> qr(unit.asDiagonal() * columns_);
     const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
     const Matrix thin = qr.householderQ() * Matrix::Identity(columns_.rows(), rank);
     const Matrix upper = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
     const Eigen::SelfAdjointEigenSolver<Matrix> solver(upper * signs_.asDiagonal() *
                                                        upper.transpose());
     const Eigen::VectorXd& values = solver.eigenvalues();  // ascending
-    const Matrix vectors = thin * solver.eigenvectors();
-    const double least = kRounding * values.cwiseAbs().maxCoeff();
+    const Matrix vectors = size.asDiagonal() * thin * solver.eigenvectors();
+    const double least = std::numeric_limits<double>::epsilon() * values.cwiseAbs().maxCoeff();
     Signed found{Matrix(columns_.rows(), 0), Matrix(columns_.rows(), 0)};
     const auto put = [&](Matrix& to, Eigen::Index k) {
       to.conservativeResize(Eigen::NoChange, to.cols() + 1);
@@ -167,11 +171,15 @@ void forget_least(const JointPrior& prior, JointCovariance& joint,
                   std::vector<CorrectedError>& edges) {
   if (edges.size() <= kMaxObservedTogether) return;
   std::vector<std::pair<double, std::size_t>> beside;
+  // An edge of which nothing was known is the last one, and on the path.
+  const auto is_beside = [&](std::size_t i) {
+    return i < prior.edges().size() && prior.is_beside(i);
+  };
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (!prior.is_beside(i)) continue;
+    if (!is_beside(i)) continue;
     double sum = 0;
     for (std::size_t k = 0; k < edges.size(); ++k) {
-      if (!prior.is_beside(k)) sum += joint.correlation(edges, i, k);
+      if (!is_beside(k)) sum += joint.correlation(edges, i, k);
     }
     beside.emplace_back(sum, i);
   }
@@ -183,64 +191,112 @@ void forget_least(const JointPrior& prior, JointCovariance& joint,
   }
 }
 
+void give(const JointCovariance& joint, std::vector<CorrectedError>& edges,
+          const std::string& name) {
+  joint.give(edges, name);
+  for (CorrectedError& edge : edges) {
+    if (!edge.forgotten) continue;
+    edge.common_errors.erase(
+        std::remove_if(edge.common_errors.begin(), edge.common_errors.end(), is_observed),
+        edge.common_errors.end());
+  }
+}
+
+// Gives the edges their new loadings of a source. Those of earlier observations are merged into
+// `observed`, unless it is null.
+void carry(const JointPrior::Source& source, const std::vector<Loading>& loadings,
+           JointCovariance* observed, std::vector<CorrectedError>& edges) {
+  if (observed != nullptr && is_observed({source.name, source.subtracts, {}})) {
+    observed->append(loadings, source.subtracts);
+    return;
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (loadings[i].isZero(0)) continue;
+    edges[i].common_errors.push_back({source.name, source.subtracts, loadings[i]});
+  }
+}
+
+// N Wᵀ, with N = own Hᵀ.
+Loading own_seen(const JointPrior& prior, std::size_t i, const Matrix6d& H, const Factor& factor) {
+  const Loading on_path = H * prior.own_roots()[i];
+  return prior.own_roots()[i] * (factor.whitening() * on_path).transpose();
+}
+
 }  // namespace
 
-std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
-                                             const std::vector<Matrix6d>& H, const Matrix6d& R,
-                                             const std::string& new_source) {
+std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const LinearPath& linear,
+                                             const Loading& R, const std::string& new_source) {
   const auto& edges = prior.edges();
-  const Moments m = prior.moments(H);
-  const Matrix6d inverse = pseudo_inverse(m.of_path + R);
-  Matrix6d S_0 = R;
+  const auto& H = linear.H;
+  const Twist rounding = rounding_of_pose(linear.reach);
+  const Factor S(joined(prior.path(H), R), rounding);
+  const auto with_path = prior.with_path(H, S.whitening());
   std::vector<Matrix6d> gains;
   std::vector<CorrectedError> corrected;
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    S_0 += H[edges[i]] * prior.own()[i] * H[edges[i]].transpose();
-    gains.push_back(m.with_edge[i] * inverse);
+    gains.emplace_back(with_path[i] * S.whitening());
     corrected.push_back({prior.own()[i], {}, false});
   }
   const bool alone = edges.size() == 1;
   if (alone) {
     // Others are correlated with it through common errors only: the rest is its own.
-    const Matrix6d rest = Matrix6d::Identity() - gains[0] * H[edges[0]];
-    corrected[0].own =
-        rest * prior.own()[0] * rest.transpose() + gains[0] * R * gains[0].transpose();
+    const Loading& own = prior.own_roots()[0];
+    const Loading rest = prior.sources().empty()
+                             ? updated_root(own, H[edges[0]] * own, R, S)
+                             : joined(own - gains[0] * (H[edges[0]] * own), gains[0] * R);
+    corrected[0].own = rest * rest.transpose();
   }
   JointCovariance observed(edges.size());
   for (const JointPrior::Source& source : prior.sources()) {
     const Loading on_path = source.on_path(prior, H);
     std::vector<Loading> loadings = source.loadings;
     for (std::size_t i = 0; i < edges.size(); ++i) loadings[i] -= gains[i] * on_path;
-    if (!alone && is_observed({source.name, source.subtracts, {}})) {
-      observed.append(loadings, source.subtracts);
-      continue;
-    }
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      if (!loadings[i].isZero(0)) {
-        corrected[i].common_errors.push_back({source.name, source.subtracts, loadings[i]});
-      }
-    }
+    carry(source, loadings, alone ? nullptr : &observed, corrected);
   }
   if (alone) return corrected;
-  const Matrix6d root = inverse_root(S_0);
+  const Factor S_0(joined(prior.own_on_path(H), R), rounding);
   std::vector<Loading> less;
   std::vector<Loading> more;
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    const Matrix6d N = prior.own()[i] * H[edges[i]].transpose();
-    less.emplace_back(N * root);
-    more.emplace_back((gains[i] * S_0 - N) * root);
+    less.push_back(own_seen(prior, i, H[edges[i]], S_0));
+    more.emplace_back(gains[i] * S_0.root() - less.back());
   }
   observed.append(less, true);
   if (!prior.sources().empty()) observed.append(more, false);
   forget_least(prior, observed, corrected);
-  observed.give(corrected, new_source);
-  for (CorrectedError& edge : corrected) {
-    if (!edge.forgotten) continue;
-    edge.common_errors.erase(
-        std::remove_if(edge.common_errors.begin(), edge.common_errors.end(), is_observed),
-        edge.common_errors.end());
-  }
+  give(observed, corrected, new_source);
   return corrected;
+}
+
+std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size_t u,
+                                              const LinearPath& linear, const Loading& R,
+                                              const std::string& new_source) {
+  const auto& edges = prior.edges();
+  const Matrix6d G = linear.H[u].inverse();
+  std::vector<CorrectedError> determined;
+  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}, false});
+  const Loading noise = G * R;
+  determined.push_back({noise * noise.transpose(), {}, false});
+  JointCovariance observed(determined.size());
+  for (const JointPrior::Source& source : prior.sources()) {
+    std::vector<Loading> loadings = source.loadings;
+    loadings.emplace_back(-G * source.on_path(prior, linear.H));
+    carry(source, loadings, &observed, determined);
+  }
+  const Factor whole(prior.own_on_path(linear.H));
+  if (whole.rank() > 0) {
+    std::vector<Loading> seen;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      seen.push_back(own_seen(prior, i, linear.H[edges[i]], whole));
+    }
+    seen.emplace_back(-G * whole.root());
+    observed.append(seen, false);
+    seen.back().setZero();
+    observed.append(seen, true);
+  }
+  forget_least(prior, observed, determined);
+  if (!observed.empty()) give(observed, determined, new_source);
+  return determined;
 }
 
 }  // namespace tfdude

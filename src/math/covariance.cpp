@@ -14,15 +14,17 @@
 namespace tfdude {
 namespace {
 
-constexpr double kSymmetryTolerance = 1e-9;
-// Smallest eigenvalue allowed, for the matrix scaled to a unit diagonal, so that metres and radians
-// of very different size are treated alike.
-constexpr double kPsdTolerance = 1e-9;
+// What counts as rounding, relative to the size of the matrix when it is scaled to a unit diagonal,
+// so that metres and radians of very different size are treated alike: negative eigenvalues as far
+// below zero as this share of the largest. Rounding to float32 moves an element by 6e-8 of it.
+constexpr double kTolerance = 1e-6;
+// Of an element, as the largest eigenvalue is at most 6 then.
+constexpr double kElementTolerance = 6 * kTolerance;
 // Each axis is scaled as if it had at least this share of the largest variance in metres (in
-// radians). The library's own results are usually semi-definite up to rounding of that largest
-// variance. An axis that is known exactly, up to rounding, must not be judged by its rounding
-// error.
-constexpr double kAxisShare = 1e-3;
+// radians). A matrix that was computed is semi-definite up to rounding of that largest variance
+// (here 1e-12 of it). An axis that is known exactly, up to rounding, must not be judged by its
+// rounding error.
+constexpr double kAxisShare = 1e-6;
 
 std::string element(std::size_t row, std::size_t column) {
   return "covariance[" + std::to_string(row) + "][" + std::to_string(column) + "]";
@@ -48,7 +50,7 @@ Result<void> scale_to_unit_diagonal(Matrix6d& m, Twist& scale) {
       if (i == j || m(i, j) == 0) continue;
       const bool zero_variance = scale[i] == 0 || scale[j] == 0;
       const double correlation = m(i, j) * scale[i] * scale[j];
-      if (zero_variance || !(std::abs(correlation) <= 1.0 + kPsdTolerance)) {
+      if (zero_variance || !(std::abs(correlation) <= 1.0 + kElementTolerance)) {
         return fail(Errc::kInvalidInput,
                     element(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) +
                         " is larger than its variances allow: not positive semi-definite");
@@ -67,7 +69,7 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
   if (auto ok = scale_to_unit_diagonal(unit, scale); !ok) return tl::unexpected(ok.error());
   const SymmetricEigen eigen = symmetric_eigen(unit);
   const double smallest = eigen.values[0];
-  if (!(smallest >= -kPsdTolerance)) {
+  if (!(smallest >= -kTolerance * eigen.values[5])) {
     return fail(Errc::kInvalidInput,
                 "covariance is not positive semi-definite: the smallest eigenvalue "
                 "of its correlation matrix is " +
@@ -82,13 +84,15 @@ Result<Covariance::Upper> checked_psd(const Covariance::Upper& upper) {
 }  // namespace
 
 Result<Covariance> Covariance::from_matrix(const Matrix6d& matrix) {
-  const double largest = matrix.cwiseAbs().maxCoeff();
+  const Twist size = judged_variances(matrix.diagonal()).cwiseSqrt();
   Upper upper{};
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {
-      const double above = matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-      const double below = matrix(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i));
-      if (std::abs(above - below) > kSymmetryTolerance * largest) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const auto column = static_cast<Eigen::Index>(j);
+      const double above = matrix(row, column);
+      const double below = matrix(column, row);
+      if (std::abs(above - below) > kElementTolerance * size[row] * size[column]) {
         return fail(Errc::kInvalidInput, element(i, j) + " and " + element(j, i) +
                                              " differ: the covariance is not symmetric");
       }
@@ -105,7 +109,7 @@ Result<Covariance> Covariance::from_upper(const Upper& upper) {
   for (std::size_t i = 0; i < 6; ++i) {
     variances[static_cast<Eigen::Index>(i)] = upper[upper_index(i, i)];
   }
-  const Twist least = -kPsdTolerance * judged_variances(variances);
+  const Twist least = -kTolerance * judged_variances(variances);
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = i; j < 6; ++j) {
       const double value = upper[upper_index(i, j)];

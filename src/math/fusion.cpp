@@ -1,6 +1,6 @@
 #include "tfdude/math/fusion.hpp"
 
-#include <cmath>
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <utility>
@@ -10,7 +10,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "math/minimum.hpp"
-#include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -18,33 +18,43 @@ namespace {
 constexpr int kMostIterations = 100;
 constexpr double kConverged = 1e-12;
 
-// N(mean, covariance) of a pose's perturbation.
+// N(mean, root rootᵀ) of a pose's perturbation.
 struct Gaussian {
   Twist mean;
-  Matrix6d covariance;
+  Loading root;
 };
 
 // The information of an estimate about δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ
 // has mean zero, and Jr(e) e = e.
 Gaussian seen_from(const Pose& X, const Transform& estimate) {
   const Twist e = log(estimate.pose.inverse() * X);
-  const Matrix6d J = right_jacobian(e);
-  return {-e, J * estimate.covariance.of_specified().matrix() * J.transpose()};
+  return {-e, right_jacobian(e) * root_of(estimate.covariance.of_specified().matrix())};
 }
 
 // Product of two Gaussians by the gain, which needs no inverse of either. False if they contradict
 // each other.
-bool merge(Gaussian& sum, const Gaussian& more) {
-  const Matrix6d S = sum.covariance + more.covariance;
-  const Matrix6d inverse = pseudo_inverse(S);
+bool merge(Gaussian& sum, const Gaussian& more, double reach) {
+  const Factor S(joined(sum.root, more.root), rounding_of_pose(reach));
   const Twist innovation = more.mean - sum.mean;
-  if (!is_possible(innovation, S, inverse)) return false;
-  const Matrix6d gain = sum.covariance * inverse;
-  const Matrix6d rest = Matrix6d::Identity() - gain;
-  sum.mean += gain * innovation;
-  sum.covariance =
-      rest * sum.covariance * rest.transpose() + gain * more.covariance * gain.transpose();
+  if (!S.can_cause(innovation, tolerance_of_pose(reach))) return false;
+  sum.mean += sum.root * (S.whitening() * sum.root).transpose() * (S.whitening() * innovation);
+  sum.root = updated_root(sum.root, sum.root, more.root, S);
   return true;
+}
+
+// Whether the last step was below rounding, or a billionth of the deviations.
+bool is_small(const Gaussian& step, double reach) {
+  constexpr double kEnough = 1e-9;
+  Twist hidden;
+  hidden << Eigen::Vector3d::Constant(kConverged * reach), Eigen::Vector3d::Constant(kConverged);
+  const Twist enough = hidden.cwiseMax(kEnough * step.root.rowwise().norm());
+  return (step.mean.cwiseAbs().array() <= enough.array()).all();
+}
+
+double reach_of(const std::vector<Transform>& estimates) {
+  double reach = 0;
+  for (const Transform& one : estimates) reach = std::max(reach, one.pose.translation().norm());
+  return reach;
 }
 
 Transform weighted(const Transform& X, double weight) {
@@ -65,21 +75,20 @@ Result<void> check_complete(const std::vector<Transform>& estimates) {
 Result<Fused> fuse(const std::vector<Transform>& estimates) {
   if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
   if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
+  const double reach = reach_of(estimates);
   Pose X = estimates.front().pose;
   for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
     Gaussian sum = seen_from(X, estimates.front());
     for (std::size_t k = 1; k < estimates.size(); ++k) {
-      if (!merge(sum, seen_from(X, estimates[k]))) {
+      if (!merge(sum, seen_from(X, estimates[k]), reach)) {
         return fail(Errc::kInvalidInput,
                     "estimate " + std::to_string(k) +
                         " contradicts earlier ones in an axis with zero variance");
       }
     }
     X = X * exp(sum.mean);
-    // Translations are rounded in proportion to their size.
-    const double scale = 1.0 + X.translation().cwiseAbs().maxCoeff();
-    if (sum.mean.cwiseAbs().maxCoeff() <= kConverged * scale) {
-      return Fused{{X, Covariance::trusted(nearest_semidefinite(sum.covariance))}, iteration};
+    if (is_small(sum, reach)) {
+      return Fused{{X, Covariance::trusted(Matrix6d(sum.root * sum.root.transpose()))}, iteration};
     }
   }
   return fail(Errc::kInvalidInput, "the estimates lie too far apart to be fused");

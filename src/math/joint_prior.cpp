@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "math/common_errors.hpp"
-#include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -38,6 +38,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
     if (all[k].way == ObservedEdge::Way::kBeside && !observed) continue;
     edges_.push_back(k);
     own_.push_back(X.own.matrix());
+    own_roots_.push_back(root_of(own_.back()));
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
     for (const CommonError& common_error : all[edges_[i]].X_PC.common_errors) {
@@ -56,35 +57,91 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
 void JointPrior::take_unknown(std::size_t edge) {
   edges_ = {edge};
   own_ = {all_[edge].X_PC.unknown->matrix()};
+  own_roots_ = {root_of(own_.front())};
   of_unknown_ = true;
 }
 
-Matrix6d JointPrior::marginal(std::size_t i) const {
-  Matrix6d sum = own_[i];
+Loading JointPrior::marginal(std::size_t i) const {
+  Loading adds = own_roots_[i];
+  Loading subtracts(6, 0);
   for (const Source& source : sources_) {
-    sum += source.sign() * source.loadings[i] * source.loadings[i].transpose();
+    Loading& sum = source.subtracts ? subtracts : adds;
+    sum = joined(sum, source.loadings[i]);
   }
-  return sources_.empty() ? sum : nearest_semidefinite(sum);
+  return root_of_difference(adds, subtracts);
 }
 
-Moments JointPrior::moments(const std::vector<Matrix6d>& H) const {
-  Moments m{{}, Matrix6d::Zero()};
+Loading JointPrior::own_on_path(const std::vector<Matrix6d>& H) const {
+  Loading columns(6, 0);
   for (std::size_t i = 0; i < edges_.size(); ++i) {
-    m.with_edge.push_back(own_[i] * H[edges_[i]].transpose());
+    if (H[edges_[i]].isZero(0)) continue;  // beside the path
+    columns = joined(columns, H[edges_[i]] * own_roots_[i]);
+  }
+  return columns;
+}
+
+Loading JointPrior::path(const std::vector<Matrix6d>& H) const {
+  Loading adds = own_on_path(H);
+  Loading subtracts(6, 0);
+  for (const Source& source : sources_) {
+    Loading& sum = source.subtracts ? subtracts : adds;
+    sum = joined(sum, source.on_path(*this, H));
+  }
+  return root_of_difference(adds, subtracts);
+}
+
+std::vector<Loading> JointPrior::with_path(const std::vector<Matrix6d>& H,
+                                           const Whitening& W) const {
+  std::vector<Loading> with_path;
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const Loading on_path = H[edges_[i]] * own_roots_[i];
+    with_path.emplace_back(own_roots_[i] * (W * on_path).transpose());
   }
   for (const Source& source : sources_) {
-    const Loading on_path = source.on_path(*this, H);
+    const Eigen::MatrixXd seen = (W * source.on_path(*this, H)).transpose();
     for (std::size_t i = 0; i < edges_.size(); ++i) {
-      m.with_edge[i] += source.sign() * source.loadings[i] * on_path.transpose();
+      with_path[i] += source.sign() * source.loadings[i] * seen;
     }
   }
-  for (std::size_t i = 0; i < edges_.size(); ++i) m.of_path += H[edges_[i]] * m.with_edge[i];
-  m.of_path = nearest_semidefinite(m.of_path);
-  return m;
+  return with_path;
+}
+
+Deviations JointPrior::most_probable(const std::vector<Matrix6d>& H, const Whitening& W,
+                                     const Eigen::VectorXd& y) const {
+  Deviations found;
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const Loading on_path = H[edges_[i]] * own_roots_[i];
+    found.own.emplace_back((W * on_path).transpose() * y);
+  }
+  for (const Source& source : sources_) {
+    found.of_source.emplace_back((W * source.on_path(*this, H)).transpose() * y);
+  }
+  return found;
+}
+
+std::vector<Twist> JointPrior::errors(const Deviations& deviations) const {
+  std::vector<Twist> xi;
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    xi.emplace_back(own_roots_[i] * deviations.own[i]);
+    for (std::size_t k = 0; k < sources_.size(); ++k) {
+      xi[i] += sources_[k].sign() * sources_[k].loadings[i] * deviations.of_source[k];
+    }
+  }
+  return xi;
+}
+
+double JointPrior::cost(const Deviations& deviations) const {
+  double sum = 0;
+  for (const Eigen::VectorXd& own : deviations.own) sum += own.squaredNorm();
+  for (std::size_t k = 0; k < sources_.size(); ++k) {
+    sum += sources_[k].sign() * deviations.of_source[k].squaredNorm();
+  }
+  return sum;
 }
 
 void JointPrior::widen(double by) {
   for (Matrix6d& own : own_) own *= by;
+  for (Loading& root : own_roots_) root *= std::sqrt(by);
   for (Source& source : sources_) {
     for (Loading& loading : source.loadings) loading *= std::sqrt(by);
   }

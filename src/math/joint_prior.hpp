@@ -5,12 +5,14 @@
 
 #include "tfdude/math/observation.hpp"
 
+#include "math/square_root.hpp"
+
 namespace tfdude {
 
-/// How the edges are correlated with the end of the path: P Hᵀ by edge, and H P Hᵀ.
-struct Moments {
-  std::vector<Matrix6d> with_edge;
-  Matrix6d of_path;
+/// An error of all edges, in standard deviations of the own parts and of the sources.
+struct Deviations {
+  std::vector<Eigen::VectorXd> own;
+  std::vector<Eigen::VectorXd> of_source;
 };
 
 /// The joint covariance P of the uncertain edges: P_ij = δ_ij own_i + Σ ± F_i F_jᵀ over the
@@ -38,6 +40,8 @@ class JointPrior {
   /// Indices of the uncertain edges.
   [[nodiscard]] const std::vector<std::size_t>& edges() const { return edges_; }
   [[nodiscard]] const std::vector<Matrix6d>& own() const { return own_; }
+  /// Roots of the own parts.
+  [[nodiscard]] const std::vector<Loading>& own_roots() const { return own_roots_; }
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
 
   /// Whether an uncertain edge is not on the path.
@@ -45,11 +49,24 @@ class JointPrior {
     return all_[edges_[i]].way == ObservedEdge::Way::kBeside;
   }
 
-  /// P_ii.
-  [[nodiscard]] Matrix6d marginal(std::size_t i) const;
+  /// A root of P_ii.
+  [[nodiscard]] Loading marginal(std::size_t i) const;
 
-  /// @param H  one per edge, for all edges
-  [[nodiscard]] Moments moments(const std::vector<Matrix6d>& H) const;
+  /// A root of H P Hᵀ. @param H  one per edge, for all edges
+  [[nodiscard]] Loading path(const std::vector<Matrix6d>& H) const;
+  /// A root of Σ H_i own_i H_iᵀ, with all columns.
+  [[nodiscard]] Loading own_on_path(const std::vector<Matrix6d>& H) const;
+  /// P Hᵀ Wᵀ by edge. What is whitened keeps its digits over long levers.
+  [[nodiscard]] std::vector<Loading> with_path(const std::vector<Matrix6d>& H,
+                                               const Whitening& W) const;
+
+  /// The most probable error if the whitened path shows y: P Hᵀ Wᵀ y.
+  [[nodiscard]] Deviations most_probable(const std::vector<Matrix6d>& H, const Whitening& W,
+                                         const Eigen::VectorXd& y) const;
+  /// ξ of the uncertain edges.
+  [[nodiscard]] std::vector<Twist> errors(const Deviations& deviations) const;
+  /// ξᵀ P⁺ ξ of a most probable error.
+  [[nodiscard]] double cost(const Deviations& deviations) const;
 
   /// P times a factor.
   void widen(double by);
@@ -58,6 +75,7 @@ class JointPrior {
   const std::vector<ObservedEdge>& all_;
   std::vector<std::size_t> edges_;
   std::vector<Matrix6d> own_;
+  std::vector<Loading> own_roots_;
   std::vector<Source> sources_;
   bool of_unknown_ = false;
 };

@@ -17,7 +17,7 @@ using Vector = Eigen::Matrix<double, 6, 1>;
 constexpr Eigen::Index kSize = 6;
 
 // The correlation that counts as none.
-constexpr double kNone = 1e-9;
+constexpr double kNone = 1e-11;
 
 // Eigenvalues of a correlation matrix below this are zero.
 constexpr double kSingular = 1e-12;

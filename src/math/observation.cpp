@@ -3,50 +3,28 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
+
+#include <Eigen/LU>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/number.hpp"
 #include "tfdude/math/fusion.hpp"
 #include "tfdude/math/perturbation.hpp"
 
+#include "math/bound_weights.hpp"
 #include "math/corrected_errors.hpp"
-#include "math/joint_prior.hpp"
 #include "math/minimum.hpp"
+#include "math/path_minimum.hpp"
 #include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
 
-constexpr int kMostIterations = 100;
-// In standard deviations of an edge: if a measurement is far more precise than the edges, no
-// smaller step can be reached.
-constexpr double kConverged = 1e-6;
-constexpr double kSmallest = 1e-12;  // [m, rad]
-
-// h(ξ) = Log(Z⁻¹ X_AB(ξ)) at the current path, and its derivative by each edge's ξ.
-struct Linear {
-  Twist h;
-  std::vector<Matrix6d> H;
-};
-
-Linear linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist>& xi,
-                 const Transform& Z_AB) {
-  Linear linear{Twist::Zero(), std::vector<Matrix6d>(edges.size())};
-  Pose X_FB;  // F: the frame reached, starting from the end of the path
-  for (std::size_t k = edges.size(); k-- > 0;) {
-    linear.H[k].setZero();
-    if (edges[k].way == ObservedEdge::Way::kBeside) continue;
-    const bool up = edges[k].way == ObservedEdge::Way::kUp;
-    const Pose X_PC = edges[k].X_PC.pose * exp(xi[k]);
-    const Pose X_CB = up ? X_PC.inverse() * X_FB : X_FB;
-    linear.H[k] = (up ? -1.0 : 1.0) * adjoint(X_CB.inverse()) * right_jacobian(xi[k]);
-    X_FB = up ? X_CB : X_PC * X_CB;
-  }
-  linear.h = log(Z_AB.pose.inverse() * X_FB);
-  const Matrix6d outer = right_jacobian(linear.h).inverse();
-  for (Matrix6d& H : linear.H) H = (outer * H).eval();
-  return linear;
+Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
+  return Covariance::trusted(nearest_semidefinite(H * sigma * H.transpose()));
 }
 
 // An observation in progress.
@@ -59,25 +37,31 @@ class Update {
         source_(source),
         options_(options),
         prior_(edges),
-        xi_(edges.size(), Twist::Zero()),
-        linear_(linearize(edges, xi_, Z_AB)),
-        R_(Z_AB.covariance.of_specified().matrix()),
+        R_(Z_AB.covariance.of_specified()),
         independent_(options.independent) {}
 
   Result<Observation> run() {
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
-    const Moments m = prior_.moments(linear_.H);
-    const Innovation innovation = innovation_of(m);
+    // Parts that may be correlated are judged by their bound.
+    PathMinimum found = independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
     Observation observation;
-    judge(innovation, observation);
-    for (const ObservedEdge& edge : all_) {
+    judge(found, observation);
+    for (const ObservedEdge& edge : all_)
       observation.edges.push_back({edge.X_PC, false, false, {}});
-    }
-    if (independent_) note_innovation(m, innovation, observation);
+    if (independent_) note_innovation(found, observation);
     if (!observation.accepted) return observation;
-    if (!independent_ && !weigh(m)) return observation;
-    if (auto ok = iterate(); !ok) return tl::unexpected(std::move(ok.error()));
-    apply(observation);
+    BoundWeights weights{1.0, 1.0};
+    if (!independent_) {
+      const auto omega = weight();
+      if (!omega) return observation;
+      weights = {1.0 / *omega, 1.0 / (1.0 - *omega)};
+      found = minimum(weights);
+    }
+    if (!found.converged) {
+      return fail(Errc::kInvalidInput,
+                  "the measurement lies too far from where the path is, towards half a turn");
+    }
+    apply(found, weights, observation);
     return observation;
   }
 
@@ -90,13 +74,10 @@ class Update {
       if (all_[k].X_PC.unknown && !all_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
     }
     if (!prior_.edges().empty()) {
-      Covariance R = Z_AB_.covariance.of_specified();
+      const auto H = at_start().H;
       for (const std::size_t k : unknown) {
-        const Matrix6d& H = linear_.H[k];
-        R = bound(
-            R, Covariance::trusted(Matrix6d(H * all_[k].X_PC.unknown->matrix() * H.transpose())));
+        R_ = bound(R_, seen(H[k], all_[k].X_PC.unknown->matrix()));
       }
-      R_ = R.matrix();
     } else if (unknown.size() == 1) {
       prior_.take_unknown(unknown.front());
     } else if (unknown.empty()) {
@@ -112,27 +93,32 @@ class Update {
     return {};
   }
 
-  // The known part of the covariance of h.
-  struct Innovation {
-    Matrix6d S;
-    Matrix6d inverse;
-    int dimensions = 0;
-  };
-
-  [[nodiscard]] Innovation innovation_of(const Moments& m) const {
-    Innovation found;
-    found.S = independent_
-                  ? Matrix6d(m.of_path + R_)
-                  : bound(Covariance::trusted(m.of_path), Covariance::trusted(R_)).matrix();
-    found.inverse = pseudo_inverse(found.S, &found.dimensions);
-    return found;
+  [[nodiscard]] LinearPath at_start() const {
+    return linearize(all_, std::vector<Twist>(all_.size(), Twist::Zero()), Z_AB_.pose);
   }
 
-  void judge(const Innovation& innovation, Observation& observation) const {
-    const bool impossible = !is_possible(linear_.h, innovation.S, innovation.inverse);
-    observation.dimensions = innovation.dimensions;
-    observation.distance_squared = impossible ? std::numeric_limits<double>::infinity()
-                                              : linear_.h.dot(innovation.inverse * linear_.h);
+  // The covariance of the path as the edges have it.
+  [[nodiscard]] Covariance path() const {
+    const Loading root = prior_.path(at_start().H);
+    return Covariance::trusted(Matrix6d(root * root.transpose()));
+  }
+
+  // With P and R by these factors.
+  [[nodiscard]] PathMinimum minimum(const BoundWeights& weights) const {
+    JointPrior prior = prior_;
+    prior.widen(weights.of_A);
+    return minimize(all_, prior, Z_AB_.pose, noise(weights));
+  }
+  [[nodiscard]] Loading noise(const BoundWeights& weights) const {
+    return std::sqrt(weights.of_B) * root_of(R_.matrix());
+  }
+
+  // By the cost at the minimum. That at the estimate is larger if the path is curved.
+  void judge(const PathMinimum& found, Observation& observation) const {
+    const bool impossible = !found.is_possible();
+    observation.dimensions = found.S.rank();
+    observation.distance_squared =
+        impossible ? std::numeric_limits<double>::infinity() : found.cost();
     const bool gated = options_.gate < 1 && observation.dimensions > 0;
     observation.limit = gated ? chi_squared_quantile(options_.gate, observation.dimensions)
                               : std::numeric_limits<double>::infinity();
@@ -140,85 +126,58 @@ class Update {
   }
 
   // Records the corrections that this observation alone would make.
-  void note_innovation(const Moments& m, const Innovation& innovation,
-                       Observation& observation) const {
+  void note_innovation(const PathMinimum& found, Observation& observation) const {
+    const auto with_path = prior_.with_path(found.linear.H, found.S.whitening());
+    const Eigen::VectorXd seen = found.S.whitening() * found.seen;
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       if (all_[prior_.edges()[i]].way == ObservedEdge::Way::kBeside) continue;
-      const Matrix6d gain = m.with_edge[i] * innovation.inverse;
-      const Matrix6d weight = gain.transpose() * pseudo_inverse(prior_.marginal(i)) * gain;
-      const Matrix6d share = weight * innovation.S;
-      observation.edges[prior_.edges()[i]].innovation = {
-          linear_.h.dot(weight * linear_.h), share.trace(), 2.0 * (share * share).trace()};
+      // In deviations of the edge, by those of the innovation.
+      const Factor edge(prior_.marginal(i));
+      const Eigen::MatrixXd gain = edge.whitening() * with_path[i];
+      const Eigen::MatrixXd share = gain.transpose() * gain;
+      observation.edges[prior_.edges()[i]].innovation = {(gain * seen).squaredNorm(), share.trace(),
+                                                         2.0 * share.squaredNorm()};
     }
   }
 
-  // Covariance intersection: inflates both sides, with the weight from which the edges gain most.
-  // False if they gain nothing.
-  bool weigh(const Moments& m) {
-    const std::vector<Twist> variances = variances_of_edges();
+  // Covariance intersection: the weight from which the edges gain most. None if they gain nothing.
+  [[nodiscard]] std::optional<double> weight() const {
+    const LinearPath linear = at_start();
+    const Loading path = prior_.path(linear.H);
+    const Loading R = noise({1.0, 1.0});
+    std::vector<Twist> variances;
     double before = 0;
-    for (const Twist& one : variances) before += units_of(one).dot(one);
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      variances.emplace_back(prior_.marginal(i).rowwise().squaredNorm());
+      before += units_of(variances[i]).dot(variances[i]);
+    }
     const auto size_at = [&](double omega) {
-      const Matrix6d inverse = pseudo_inverse(m.of_path / omega + R_ / (1.0 - omega));
+      const Factor S(joined(path / std::sqrt(omega), R / std::sqrt(1.0 - omega)),
+                     rounding_of_pose(linear.reach));
+      const auto gains = prior_.with_path(linear.H, S.whitening());
       double sum = 0;
       for (std::size_t i = 0; i < variances.size(); ++i) {
-        const Twist taken =
-            (m.with_edge[i] * inverse * m.with_edge[i].transpose()).diagonal() / omega;
+        const Twist taken = gains[i].rowwise().squaredNorm() / omega;
         sum += units_of(variances[i]).dot(variances[i] - taken) / omega;
       }
       return sum;
     };
     const double omega = minimum_within_unit(size_at);
-    if (size_at(omega) >= before) return false;
-    prior_.widen(1.0 / omega);
-    R_ /= 1.0 - omega;
-    return true;
+    if (size_at(omega) >= before) return std::nullopt;
+    return omega;
   }
 
-  [[nodiscard]] std::vector<Twist> variances_of_edges() const {
-    std::vector<Twist> variances;
-    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
-      variances.emplace_back(prior_.marginal(i).diagonal());
-    }
-    return variances;
-  }
-
-  Result<void> iterate() {
-    const auto& edges = prior_.edges();
-    const std::vector<Twist> variances = variances_of_edges();
-    for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-      const Moments m = prior_.moments(linear_.H);
-      Twist seen = -linear_.h;
-      for (const std::size_t k : edges) seen += linear_.H[k] * xi_[k];
-      const Twist weighted = pseudo_inverse(m.of_path + R_) * seen;
-      double change = 0;
-      for (std::size_t i = 0; i < edges.size(); ++i) {
-        const Twist next = m.with_edge[i] * weighted;
-        const Twist step = (next - xi_[edges[i]]).cwiseAbs();
-        const Twist deviations = variances[i].cwiseMax(0.0).cwiseSqrt();
-        for (int axis = 0; axis < 6; ++axis) {
-          if (step[axis] > kSmallest) change = std::max(change, step[axis] / deviations[axis]);
-        }
-        xi_[edges[i]] = next;
-      }
-      linear_ = linearize(all_, xi_, Z_AB_);
-      if (change <= kConverged) return {};
-    }
-    return fail(Errc::kInvalidInput,
-                "the measurement lies too far from where the path is, towards half a turn");
-  }
-
-  void apply(Observation& observation) {
-    const auto corrected = corrected_errors(prior_, linear_.H, R_, source_);
+  void apply(const PathMinimum& found, const BoundWeights& weights, Observation& observation) {
+    prior_.widen(weights.of_A);
+    const auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
       // The error now refers to another pose.
-      const Matrix6d J = right_jacobian(xi_[k]);
-      const Covariance own =
-          Covariance::trusted(nearest_semidefinite(J * corrected[i].own * J.transpose()));
+      const Matrix6d J = right_jacobian(found.xi[k]);
+      const Covariance own = seen(J, corrected[i].own);
       (prior_.is_of_unknown() ? result.X_PC.unknown.emplace() : result.X_PC.own) = own;
-      result.X_PC.pose = result.X_PC.pose * exp(xi_[k]);
+      result.X_PC.pose = result.X_PC.pose * exp(found.xi[k]);
       result.X_PC.common_errors = corrected[i].common_errors;
       for (CommonError& error : result.X_PC.common_errors)
         error.loading = (J * error.loading).eval();
@@ -232,9 +191,7 @@ class Update {
   const std::string& source_;
   const ObserveOptions& options_;
   JointPrior prior_;
-  std::vector<Twist> xi_;
-  Linear linear_;
-  Matrix6d R_;
+  Covariance R_;
   bool independent_;
 };
 
@@ -245,51 +202,58 @@ class Unspecified {
  public:
   Unspecified(const std::vector<ObservedEdge>& edges, std::size_t index, const Transform& Z_AB,
               const ObserveOptions& options)
-      : edges_(edges), index_(index), Z_AB_(Z_AB), options_(options) {
+      : edges_(edges), index_(index), Z_AB_(Z_AB) {
     Belief& X_PC = edges_[index].X_PC;
     independent_ = options.independent && !X_PC.unknown;
-    X_PC.pose = agreeing();
-    X_PC.unknown.reset();
-    X_PC.own = {};
-    X_PC.unspecified = false;
+    // What it had in common with others is part of an error that is not known.
+    X_PC = {agreeing(), {}, std::nullopt, {}};
   }
 
-  Result<Observation> run(const std::string& source) {
-    const Linear linear =
-        linearize(edges_, std::vector<Twist>(edges_.size(), Twist::Zero()), Z_AB_);
-    const JointPrior others(edges_);
-    Covariance S = Z_AB_.covariance.of_specified();
-    const auto add = [&](const Covariance& more) { S = independent_ ? S + more : bound(S, more); };
+  [[nodiscard]] Observation run(const std::string& source) {
+    const LinearPath linear =
+        linearize(edges_, std::vector<Twist>(edges_.size(), Twist::Zero()), Z_AB_.pose);
+    std::vector<std::size_t> unknown;
     for (std::size_t k = 0; k < edges_.size(); ++k) {
       if (edges_[k].way == ObservedEdge::Way::kBeside || !edges_[k].X_PC.unknown) continue;
-      independent_ = false;
-      add(seen(linear.H[k], edges_[k].X_PC.unknown->matrix()));
+      unknown.push_back(k);
     }
-    if (!others.edges().empty()) add(Covariance::trusted(others.moments(linear.H).of_path));
-    const Matrix6d from_path = linear.H[index_].inverse();
-    if (independent_ && !others.edges().empty()) {
-      edges_[index_].X_PC.own = seen(kWide * from_path, S.matrix());
-      auto found = Update(edges_, Z_AB_, source, options_).run();
-      if (found) compared_with_nothing(*found);
+    independent_ = independent_ && unknown.empty();
+    Observation found = compared_with_nothing();
+    for (const ObservedEdge& edge : edges_) found.edges.push_back({edge.X_PC, false, false, {}});
+    const JointPrior others(edges_);
+    if (independent_) {
+      correlate(others, linear, source, found);
       return found;
     }
-    Observation found;
-    compared_with_nothing(found);
-    for (const ObservedEdge& edge : edges_) found.edges.push_back({edge.X_PC, false, false, {}});
-    ObservedResult& result = found.edges[index_];
-    result.corrected = true;
-    (independent_ ? result.X_PC.own : result.X_PC.unknown.emplace()) = seen(from_path, S.matrix());
+    Covariance S = Z_AB_.covariance.of_specified();
+    for (const std::size_t k : unknown) {
+      S = bound(S, seen(linear.H[k], edges_[k].X_PC.unknown->matrix()));
+    }
+    const Loading path = others.path(linear.H);
+    S = bound(S, Covariance::trusted(Matrix6d(path * path.transpose())));
+    Belief& X_PC = found.edges[index_].X_PC;
+    X_PC.unknown = seen(linear.H[index_].inverse(), S.matrix());
+    X_PC.common_errors.clear();
+    found.edges[index_].corrected = true;
     return found;
   }
 
  private:
-  // The standard deviations of the error before the measurement, by those after it: so wide that it
-  // hardly matters (a millionth of the variance), and narrow enough for the correlation between the
-  // edges to be exact.
-  static constexpr double kWide = 1e3;
-
-  static Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
-    return Covariance::trusted(nearest_semidefinite(H * sigma * H.transpose()));
+  void correlate(const JointPrior& others, const LinearPath& linear, const std::string& source,
+                 Observation& found) const {
+    const auto determined = determined_errors(
+        others, index_, linear, root_of(Z_AB_.covariance.of_specified().matrix()), source);
+    const auto put = [&](std::size_t k, const CorrectedError& error) {
+      found.edges[k].X_PC.own = Covariance::trusted(nearest_semidefinite(error.own));
+      found.edges[k].X_PC.common_errors = error.common_errors;
+      found.edges[k].corrected = true;
+      found.edges[k].forgotten = error.forgotten;
+    };
+    put(index_, determined.back());
+    for (std::size_t i = 0; i < others.edges().size(); ++i) {
+      const std::size_t k = others.edges()[i];
+      if (!(determined[i].common_errors == edges_[k].X_PC.common_errors)) put(k, determined[i]);
+    }
   }
 
   // The edge's pose with which the path is Z_AB.
@@ -306,18 +270,16 @@ class Unspecified {
     return edges_[index_].way == ObservedEdge::Way::kUp ? along.inverse() : along;
   }
 
-  static void compared_with_nothing(Observation& found) {
-    found.distance_squared = 0;
-    found.dimensions = 0;
+  [[nodiscard]] static Observation compared_with_nothing() {
+    Observation found;
     found.limit = std::numeric_limits<double>::infinity();
     found.accepted = true;
-    for (ObservedResult& result : found.edges) result.innovation = {};
+    return found;
   }
 
   std::vector<ObservedEdge> edges_;
   std::size_t index_;
   const Transform& Z_AB_;
-  const ObserveOptions& options_;
   bool independent_ = true;
 };
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "math/symmetric_eigen.hpp"
+#include "math/square_root.hpp"
 
 // With a square root of Σ, ξ = Σi li zi for independent zi of variance one, and Exp(ξ) p is a
 // polynomial in z: the coefficients of its powers, applied to p, give all moments.
@@ -22,11 +22,11 @@ struct Generators {
 };
 
 Generators generators_of(const Covariance& sigma) {
-  const SymmetricEigen eigen = symmetric_eigen(sigma.matrix());
+  const Loading root = root_of(sigma.matrix());
   Generators all;
   all.squares.setZero();
   for (int i = 0; i < 6; ++i) {
-    const Twist l = eigen.vectors.col(i) * std::sqrt(std::max(eigen.values[i], 0.0));
+    const Twist l = i < root.cols() ? Twist(root.col(i)) : Twist(Twist::Zero());
     all.l[i].setZero();
     all.l[i].topLeftCorner<3, 3>() = skew(l.tail<3>());
     all.l[i].topRightCorner<3, 1>() = l.head<3>();

@@ -1,10 +1,12 @@
 #include "math/semidefinite.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
 
+#include "math/square_root.hpp"
 #include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
@@ -13,10 +15,32 @@ namespace {
 constexpr double kRounding = 1e-12;
 // Pivots above this settle the sign of the smallest eigenvalue.
 constexpr double kClearPivot = 1e-7;
+// Of a difference, this share of what was subtracted: rounding is below a hundredth of it.
+constexpr double kClearRest = 1e-13;
 
 bool is_zero_axis(const Covariance::Upper& upper, std::size_t k) {
   for (std::size_t i = 0; i < 6; ++i) {
     if (upper[upper_index(std::min(i, k), std::max(i, k))] != 0) return false;
+  }
+  return true;
+}
+
+// Of an LDLᵀ factorization. Where nothing is demanded, the axis must be zero.
+bool pivots_exceed(const Covariance::Upper& upper, const std::array<double, 6>& least) {
+  double a[6][6];
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = i; j < 6; ++j) a[i][j] = upper[upper_index(i, j)];
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    if (least[k] == 0) {
+      if (!is_zero_axis(upper, k)) return false;
+      continue;
+    }
+    if (!(a[k][k] > least[k])) return false;
+    for (std::size_t i = k + 1; i < 6; ++i) {
+      const double factor = a[k][i] / a[k][k];
+      for (std::size_t j = i; j < 6; ++j) a[i][j] -= factor * a[k][j];
+    }
   }
   return true;
 }
@@ -38,23 +62,21 @@ Twist inverse_units(const Twist& unit) {
 }  // namespace
 
 bool is_clearly_semidefinite(const Covariance::Upper& upper) {
-  double a[6][6];
-  for (std::size_t i = 0; i < 6; ++i) {
-    for (std::size_t j = i; j < 6; ++j) a[i][j] = upper[upper_index(i, j)];
-  }
+  std::array<double, 6> least;
   for (std::size_t k = 0; k < 6; ++k) {
     const double variance = upper[upper_index(k, k)];
-    if (variance == 0) {
-      if (!is_zero_axis(upper, k)) return false;
-      continue;
-    }
-    if (!(a[k][k] > kClearPivot * variance && variance <= kMaxVariance)) return false;
-    for (std::size_t i = k + 1; i < 6; ++i) {
-      const double factor = a[k][i] / a[k][k];
-      for (std::size_t j = i; j < 6; ++j) a[i][j] -= factor * a[k][j];
-    }
+    if (!(variance <= kMaxVariance)) return false;
+    least[k] = kClearPivot * variance;
   }
-  return true;
+  return pivots_exceed(upper, least);
+}
+
+bool is_clear_difference(const Covariance& difference, const Twist& variances) {
+  std::array<double, 6> least;
+  for (std::size_t k = 0; k < 6; ++k) {
+    least[k] = kClearRest * variances[static_cast<Eigen::Index>(k)];
+  }
+  return pivots_exceed(difference.upper(), least);
 }
 
 bool is_semidefinite(const Covariance& symmetric) {
@@ -77,17 +99,9 @@ Matrix6d nearest_semidefinite(const Matrix6d& symmetric) {
 }
 
 Matrix6d pseudo_inverse(const Matrix6d& semidefinite, int* rank) {
-  const Twist unit = units(semidefinite);
-  const SymmetricEigen eigen = symmetric_eigen(scaled(semidefinite, unit));
-  const double least = kRounding * eigen.values.cwiseAbs().maxCoeff();
-  if (rank != nullptr) *rank = static_cast<int>((eigen.values.array() > least).count());
-  return scaled(eigen.of([least](double value) { return value > least ? 1.0 / value : 0.0; }),
-                unit);
-}
-
-bool is_possible(const Twist& difference, const Matrix6d& covariance, const Matrix6d& inverse) {
-  constexpr double kAgrees = 1e-9;
-  return (difference - covariance * (inverse * difference)).cwiseAbs().maxCoeff() <= kAgrees;
+  const Factor factor(root_of(semidefinite));
+  if (rank != nullptr) *rank = factor.rank();
+  return factor.whitening().transpose() * factor.whitening();
 }
 
 }  // namespace tfdude

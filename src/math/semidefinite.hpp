@@ -9,6 +9,10 @@ namespace tfdude {
 /// are left out. False for NaN, and for variances above kMaxVariance.
 [[nodiscard]] bool is_clearly_semidefinite(const Covariance::Upper& upper);
 
+/// As is_clearly_semidefinite(), for a difference of covariances: clear are pivots that exceed the
+/// rounding of the variances that it was computed from.
+[[nodiscard]] bool is_clear_difference(const Covariance& difference, const Twist& variances);
+
 /// Whether a symmetric matrix has no eigenvalue below zero, up to rounding.
 [[nodiscard]] bool is_semidefinite(const Covariance& symmetric);
 
@@ -17,15 +21,8 @@ namespace tfdude {
 /// An axis whose variance is not positive becomes zero.
 [[nodiscard]] Matrix6d nearest_semidefinite(const Matrix6d& symmetric);
 
-/// A⁺ for symmetric positive semi-definite A, in the same units. Eigenvalues below 1e-12 of the
-/// largest count as zero.
-/// @param rank  output: the number of other eigenvalues; may be null
+/// A⁺ for symmetric positive semi-definite A, in the same units (Factor in square_root.hpp).
+/// @param rank  output: the rank of A; may be null
 [[nodiscard]] Matrix6d pseudo_inverse(const Matrix6d& semidefinite, int* rank = nullptr);
-
-/// Whether errors with this covariance can cause the difference: nothing [m, rad] may remain, up to
-/// rounding, in directions that are known exactly.
-/// @param inverse  pseudo_inverse() of the covariance
-[[nodiscard]] bool is_possible(const Twist& difference, const Matrix6d& covariance,
-                               const Matrix6d& inverse);
 
 }  // namespace tfdude

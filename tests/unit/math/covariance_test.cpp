@@ -167,7 +167,7 @@ TEST_CASE("an asymmetric matrix is rejected") {
   if (i == j) return;
   CAPTURE(i, j);
   Matrix6d m = Matrix6d::Identity();
-  m(i, j) = 1e-8;
+  m(i, j) = 1e-5;
   CHECK(contains(refusal(m), name(std::min(i, j), std::max(i, j))));
   CHECK(contains(refusal(m), "not symmetric"));
   m(i, j) = 1e-10;  // rounding: the mean of both is taken
@@ -221,7 +221,7 @@ TEST_CASE("a correlation beyond one is rejected") {
   const int i = GENERATE(range(0, 6));
   const int j = GENERATE(range(0, 6));
   if (i >= j) return;
-  const double excess = GENERATE(1e-7, 1e-3, 1.0);
+  const double excess = GENERATE(1e-5, 1e-3, 1.0);
   const double sign = GENERATE(1.0, -1.0);
   CAPTURE(i, j, excess, sign);
   Matrix6d m = Matrix6d::Identity();
@@ -309,36 +309,74 @@ TEST_CASE("axes of different size are distinguished down to rounding of the larg
   CHECK(refusal(m) != "");
 }
 
-TEST_CASE("decimal rounding is accepted up to 1e-9 and rejected beyond") {
-  // The tolerance: with every axis scaled to a variance of one, no eigenvalue below -1e-9. Rounding
-  // to d digits moves each element by up to 5·10^-d of it, an eigenvalue by up to 6 times that:
-  // twelve digits always pass, six may well be rejected, and whatever passes comes out
+TEST_CASE("decimal rounding is accepted up to 1e-6 and rejected beyond") {
+  // The tolerance: with every axis scaled to a variance of one, no eigenvalue below -1e-6 of the
+  // largest. Rounding to d digits moves each element by up to 5·10^-d of it, an eigenvalue by up to
+  // 6 times that: eight digits always pass, four may well be rejected, and whatever passes comes out
   // semi-definite.
   Random random(112);
   INFO("seed " << random.seed());
   int accepted = 0;
   int refused = 0;
   for (int i = 0; i < 300; ++i) {
-    const int digits = std::array<int, 5>{6, 8, 9, 10, 12}[random.index(5)];
+    const int digits = std::array<int, 5>{3, 4, 5, 6, 8}[random.index(5)];
     const Twist xi = Twist::Constant(1) + 0.5 * random.twist(1.0, 1.0);
     const Twist eta = Twist::Constant(1) + 0.5 * random.twist(1.0, 1.0);
     Matrix6d m = xi * xi.transpose() + eta * eta.transpose();
     m = m.unaryExpr([digits](double value) { return rounded(value, digits); });
     const Twist scale = m.diagonal().cwiseSqrt().cwiseInverse();
     const Matrix6d unit = scale.asDiagonal() * m * scale.asDiagonal();
-    const double smallest = eigenvalues(unit)[0];
+    const Eigen::VectorXd values = eigenvalues(unit);
+    const double smallest = values[0] / values[5];
     CAPTURE(i, digits, smallest);
-    if (digits == 12) CHECK(smallest > -1e-10);
+    if (digits == 8) CHECK(smallest > -1e-6);
     const auto sigma = Covariance::from_matrix(m);
-    CHECK(sigma.has_value() == (smallest >= -1e-9));
+    CHECK(sigma.has_value() == (smallest >= -1e-6));
     ++(sigma ? accepted : refused);
     if (!sigma) continue;
     CHECK(smallest_eigenvalue(sigma->matrix()) >= -1e-12);
-    CHECK(covariance_diff(*sigma, Covariance::trusted(m), 1e-8) == "");
+    CHECK(covariance_diff(*sigma, Covariance::trusted(m), 1e-5) == "");
     CHECK(Covariance::from_upper(sigma->upper()));  // what was lifted is fit to be sent on
   }
   CHECK(accepted > 50);
   CHECK(refused > 50);
+}
+
+TEST_CASE("covariances of any rank and size pass after rounding to float32") {
+  Random random(113);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 2000; ++i) {
+    const int rank = 1 + static_cast<int>(random.index(6));
+    const double metres = std::pow(10.0, random.uniform(-9, 8));
+    const double radians = std::pow(10.0, random.uniform(-9, 0));
+    CAPTURE(i, rank, metres, radians);
+    Matrix6d m = Matrix6d::Zero();
+    for (int k = 0; k < rank; ++k) {
+      Twist xi = random.twist(radians, metres);
+      xi[static_cast<int>(random.index(6))] *= 1e-3;
+      m += xi * xi.transpose();
+    }
+    const Matrix6d Ad = adjoint(random.pose(std::pow(10.0, random.uniform(-2, 6))));
+    m = (Ad * m * Ad.transpose()).eval();
+    if (m.maxCoeff() > kMaxVariance) continue;
+    const Matrix6d even = 0.5 * (m + m.transpose());
+    const auto sigma = Covariance::from_matrix(even.cast<float>().cast<double>());
+    REQUIRE(sigma);
+    CHECK(covariance_diff(*sigma, Covariance::trusted(even), 1e-6) == "");
+  }
+}
+
+TEST_CASE("a product that was computed in float32 passes though it is not quite symmetric") {
+  Random random(114);
+  INFO("seed " << random.seed());
+  using Matrix6f = Eigen::Matrix<float, 6, 6>;
+  for (int i = 0; i < 2000; ++i) {
+    const Matrix6f J = adjoint(random.pose(10.0)).cast<float>();
+    const Matrix6f S = random.covariance(0.01, 0.01).matrix().cast<float>();
+    const Matrix6f product = J * S * J.transpose();
+    CAPTURE(i);
+    CHECK(refusal(product.cast<double>()) == "");
+  }
 }
 
 // ---- transport

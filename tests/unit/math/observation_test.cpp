@@ -316,5 +316,63 @@ TEST_CASE("NormalizedInnovation finds the edge whose covariance is too small") {
   }
 }
 
+// The joint covariance of the edges of a path down, after a measurement equal to the belief.
+Eigen::MatrixXd dense_after(const std::vector<ObservedEdge>& edges, const Covariance& R) {
+  const auto size = static_cast<Eigen::Index>(6 * edges.size());
+  Eigen::MatrixXd P = Eigen::MatrixXd::Zero(size, size);
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(6, size);
+  Pose X_CB;
+  for (Eigen::Index i = size - 6; i >= 0; i -= 6) {
+    const Belief& X = edges[static_cast<std::size_t>(i / 6)].X_PC;
+    P.block<6, 6>(i, i) = X.own.matrix();
+    H.middleCols<6>(i) = adjoint(X_CB.inverse());
+    X_CB = X.pose * X_CB;
+  }
+  const Matrix6d S = H * P * H.transpose() + R.matrix();
+  return P - P * H.transpose() * testing::inverse_of(S) * H * P;
+}
+
+Covariance isotropic(double metres, double radians) {
+  return *Covariance::from_stddev({metres, metres, metres, radians, radians, radians});
+}
+
+TEST_CASE("To fourth order an observed path is as certain as samples of its edges") {
+  Random random(913);
+  INFO("seed " << random.seed());
+  const int count = GENERATE(2, 3);
+  const double radians = GENERATE(0.1, 0.2, 0.3);
+  const double measured = GENERATE(0.01, 0.001);
+  CAPTURE(count, radians, measured);
+  std::vector<ObservedEdge> edges;
+  Pose X;
+  for (int i = 0; i < count; ++i) {
+    const Pose X_PC = Pose::trusted(Eigen::Quaterniond::Identity(), random.vector(1.0));
+    edges.push_back({{X_PC, isotropic(0.1, radians), std::nullopt, {}}, kDown});
+    X = X * X_PC;
+  }
+  const Covariance R = isotropic(measured, measured);
+  const auto observed = observe(edges, {X, R}, kSource);
+  REQUIRE(observed);
+  // From the end up, as lookups compose.
+  Belief path;
+  for (auto edge = observed->edges.rbegin(); edge != observed->edges.rend(); ++edge) {
+    path = compose(edge->X_PC, path, Order::kFourth);
+  }
+  const Matrix6d claimed = collapse(path).covariance.of_specified().matrix();
+  const Gaussian errors(dense_after(edges, R));
+  constexpr int kSamples = 20'000;
+  const Matrix6d sampled = testing::second_moment(kSamples, [&]() -> Twist {
+    const Eigen::VectorXd e = errors(random);
+    Pose moved;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      moved = moved * edges[i].X_PC.pose * exp(e.segment<6>(static_cast<Eigen::Index>(6 * i)));
+    }
+    return log(X.inverse() * moved);
+  });
+  // Two edges cancel; between three, terms of sixth order are left.
+  const double left = count == 2 ? 0.02 : 0.02 + 2 * std::pow(radians, 2);
+  CHECK(testing::moment_diff(sampled, claimed, kSamples, left) == "");
+}
+
 }  // namespace
 }  // namespace tfdude

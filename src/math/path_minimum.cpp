@@ -1,0 +1,203 @@
+#include "math/path_minimum.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <Eigen/LU>
+
+#include "tfdude/math/perturbation.hpp"
+
+namespace tfdude {
+namespace {
+
+constexpr int kMostIterations = 100;
+constexpr int kMostHalvings = 20;
+// In standard deviations of an edge.
+constexpr double kConverged = 1e-6;
+// Of the cost, which is in squared standard deviations: no smaller gain is worth a step.
+constexpr double kNoGain = 1e-9;
+// If part of the measurement is exact, the cost would be infinite beside the minimum. So costs are
+// compared as if it had this share of the path's deviation.
+constexpr double kComparedAs = 1e-6;
+
+// Times the dimensions: a cost that right measurements seldom exceed.
+constexpr double kDoubtful = 2.0;
+constexpr int kIterationsAtOnce = 10;
+
+// Errors of the edges.
+struct Errors {
+  Deviations deviations;
+  std::vector<Twist> xi;  // of all edges
+};
+
+Deviations between(const Deviations& from, const Deviations& to, double share) {
+  Deviations at = to;
+  for (std::size_t i = 0; i < to.own.size(); ++i) {
+    at.own[i] = from.own[i] + share * (to.own[i] - from.own[i]);
+  }
+  for (std::size_t k = 0; k < to.of_source.size(); ++k) {
+    at.of_source[k] = from.of_source[k] + share * (to.of_source[k] - from.of_source[k]);
+  }
+  return at;
+}
+
+class Descent {
+ public:
+  Descent(const std::vector<ObservedEdge>& edges, const JointPrior& prior, const Pose& Z_AB,
+          const Loading& R)
+      : all_(edges), prior_(prior), Z_AB_(Z_AB), R_(R) {}
+
+  PathMinimum run() {
+    start();
+    const PathMinimum at_start = here();
+    path_ = prior_.path(linear_.H);
+    PathMinimum found = approach(R_, kMostIterations);
+    if (found.converged && found.cost() <= kDoubtful * found.S.rank()) return found;
+    // Perhaps not the least minimum. Another way to it: from less precise measurements to this one.
+    start();
+    for (double share = 1.0; share > kComparedAs; share *= 0.25) {
+      (void)approach(joined(R_, share * path_), kIterationsAtOnce);
+    }
+    PathMinimum other = approach(R_, kMostIterations);
+    if (other.converged && !(found.converged && found.cost() <= other.cost())) return other;
+    return found.converged ? found : at_start;
+  }
+
+ private:
+  enum class Step { kMore, kLast, kStuck };
+
+  void start() {
+    linear_ = linearize(all_, std::vector<Twist>(all_.size(), Twist::Zero()), Z_AB_);
+    at_ = of(prior_.most_probable(linear_.H, Whitening::Zero(0, 6), Eigen::VectorXd(0)));
+    noise_ = R_;
+  }
+
+  // From where it is, as if the measurement had that noise.
+  PathMinimum approach(const Loading& noise, int iterations) {
+    noise_ = noise;
+    compared_.emplace(joined(noise, kComparedAs * path_), rounding_of_pose(linear_.reach));
+    PathMinimum now = here();
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      const Step step = descend(now);
+      if (step == Step::kStuck) break;
+      now = here();
+      now.converged = step == Step::kLast;
+      if (now.converged) break;
+    }
+    return now;
+  }
+
+  [[nodiscard]] PathMinimum here() const {
+    Twist seen = -linear_.h;
+    for (const std::size_t k : prior_.edges()) seen += linear_.H[k] * at_.xi[k];
+    Factor S(joined(prior_.path(linear_.H), noise_), rounding_of_pose(linear_.reach));
+    return {at_.xi, linear_, std::move(S), seen, false};
+  }
+
+  [[nodiscard]] double cost(const Errors& errors, const Twist& h) const {
+    return prior_.cost(errors.deviations) + compared_->distance_squared(h);
+  }
+
+  [[nodiscard]] Errors of(Deviations deviations) const {
+    Errors errors{std::move(deviations), std::vector<Twist>(all_.size(), Twist::Zero())};
+    const auto xi = prior_.errors(errors.deviations);
+    for (std::size_t i = 0; i < xi.size(); ++i) errors.xi[prior_.edges()[i]] = xi[i];
+    return errors;
+  }
+
+  // Where the cost of the linear problem is least.
+  [[nodiscard]] Errors best(const PathMinimum& now) const {
+    const Whitening& W = now.S.whitening();
+    return of(prior_.most_probable(now.linear.H, W, W * now.seen));
+  }
+
+  Step descend(const PathMinimum& now) {
+    const Errors whole = best(now);
+    const double before = cost(at_, linear_.h);
+    const double gain = before - cost(whole, expected(whole, now));
+    const bool last = is_small(whole) || gain <= hidden_gain(before);
+    double share = 1.0;
+    for (int halving = 0; halving < kMostHalvings; ++halving, share *= 0.5) {
+      Errors next = of(between(at_.deviations, whole.deviations, share));
+      LinearPath linear = linearize(all_, next.xi, Z_AB_);
+      if (!last && !(cost(next, linear.h) < before)) continue;
+      at_ = std::move(next);
+      linear_ = std::move(linear);
+      return last ? Step::kLast : Step::kMore;
+    }
+    return Step::kStuck;
+  }
+
+  // h after a step, if the path were linear.
+  [[nodiscard]] Twist expected(const Errors& next, const PathMinimum& now) const {
+    Twist h = -now.seen;
+    for (const std::size_t k : prior_.edges()) h += now.linear.H[k] * next.xi[k];
+    return h;
+  }
+
+  // By how much rounding of h moves a cost.
+  [[nodiscard]] double hidden_gain(double cost) const {
+    const Twist rounding = rounding_of_pose(linear_.reach);
+    const double by = (compared_->whitening().cwiseAbs() * rounding).norm();
+    return by * (2.0 * std::sqrt(cost) + by) + kNoGain * (1.0 + cost);
+  }
+
+  // Whether the step is below a millionth of the edges' deviations, or of what rounding hides.
+  [[nodiscard]] bool is_small(const Errors& next) {
+    if (deviations_.empty()) {
+      for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+        deviations_.emplace_back(prior_.marginal(i).rowwise().norm());
+      }
+    }
+    const Twist hidden = rounding_of_pose(linear_.reach);
+    for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
+      const std::size_t k = prior_.edges()[i];
+      const Twist step = (next.xi[k] - at_.xi[k]).cwiseAbs();
+      const Twist enough = (kConverged * deviations_[i]).cwiseMax(hidden);
+      if (!(step.array() <= enough.array()).all()) return false;
+    }
+    return true;
+  }
+
+  const std::vector<ObservedEdge>& all_;
+  const JointPrior& prior_;
+  const Pose& Z_AB_;
+  const Loading& R_;
+  Loading noise_;
+  Loading path_;  // a root of the path's covariance at ξ = 0
+  Errors at_;
+  LinearPath linear_;
+  std::optional<Factor> compared_;
+  std::vector<Twist> deviations_;
+};
+
+}  // namespace
+
+LinearPath linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist>& xi,
+                     const Pose& Z_AB) {
+  LinearPath linear{Twist::Zero(), std::vector<Matrix6d>(edges.size()), Z_AB.translation().norm()};
+  Pose X_FB;  // F: the frame reached, starting from the end of the path
+  for (std::size_t k = edges.size(); k-- > 0;) {
+    linear.H[k].setZero();
+    if (edges[k].way == ObservedEdge::Way::kBeside) continue;
+    const bool up = edges[k].way == ObservedEdge::Way::kUp;
+    const Pose X_PC = edges[k].X_PC.pose * exp(xi[k]);
+    const Pose X_CB = up ? X_PC.inverse() * X_FB : X_FB;
+    linear.H[k] = (up ? -1.0 : 1.0) * adjoint(X_CB.inverse()) * right_jacobian(xi[k]);
+    X_FB = up ? X_CB : X_PC * X_CB;
+    linear.reach += X_PC.translation().norm();
+  }
+  linear.h = log(Z_AB.inverse() * X_FB);
+  const Matrix6d outer = right_jacobian(linear.h).inverse();
+  for (Matrix6d& H : linear.H) H = (outer * H).eval();
+  return linear;
+}
+
+PathMinimum minimize(const std::vector<ObservedEdge>& edges, const JointPrior& prior,
+                     const Pose& Z_AB, const Loading& R) {
+  return Descent(edges, prior, Z_AB, R).run();
+}
+
+}  // namespace tfdude
