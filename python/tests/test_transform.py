@@ -44,7 +44,7 @@ def test_default_is_identity_of_unspecified_covariance():
 
 def test_unspecified_covariance_cannot_be_overlooked():
     X = Transform((1, 2, 3))
-    for name in ("covariance", "stddev", "left_covariance", "ros_covariance"):
+    for name in ("covariance", "stddev", "stddev_in_parent", "left_covariance", "ros_covariance"):
         with pytest.raises(tfdude.UnspecifiedCovariance):
             getattr(X, name)
     assert np.array_equal(X.covariance_of_specified, np.zeros((6, 6)))
