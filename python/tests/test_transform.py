@@ -232,6 +232,15 @@ def test_equality_and_text():
     assert X.with_covariance(None) == Transform((1, 2, 3))
 
 
+def test_deviations_beside_coordinates():
+    # Turned by 90 degrees about z: the child's x is the parent's y.
+    X = Transform((1, 2, 0), [0, 0, 0.5**0.5, 0.5**0.5], stddev=[0.001, 0.1, 0.002, 0.01, 0.02, 0.03])
+    assert np.allclose(X.stddev_in_parent, [0.1, 0.001, 0.002, 0.01, 0.02, 0.03])
+    assert np.allclose(X.stddev_in_parent[:3], np.sqrt(np.diag(X.ros_covariance))[:3])
+    assert "stddev_in_parent=[0.1" in repr(X)
+    assert "stddev=" not in repr(X)
+
+
 GERMAN = """
 import locale, tfdude
 locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")

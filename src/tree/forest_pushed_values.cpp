@@ -118,6 +118,7 @@ void Telling::tell_newest(std::uint64_t seen) {
   const Sample* newest = samples.sample(edge_.number);
   if (newest != nullptr && newest->commit <= seen) return;
   tell(time_of(edge_.stamp), edge_.X_PC);
+  values_.back().made_up = samples.made_up(edge_.number);
   if (seen == 0 || newest == nullptr) return;
   const Sample* before = newest;
   for (std::uint64_t number = edge_.number; before != nullptr && before->commit > seen; --number) {
@@ -138,6 +139,7 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
     if (is_new(*sample)) {
       // The edge's version may be newer than the sample that it shows.
       tell(time_of(sample->stamp), number == edge_.number ? edge_.X_PC : sample->value());
+      values_.back().made_up = samples.made_up(number);
     }
     before = sample;
   }

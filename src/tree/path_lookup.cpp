@@ -59,7 +59,9 @@ Result<void> compute_beyond(const HeldVersion& edge, std::int64_t t, const Query
                             OfEdge<Value>& X) {
   if (edge.lacks_sample()) return no_data(Errc::kNotYet);
   const std::int64_t beyond = t - edge.stamp;
-  if (beyond > query.extrapolate.count()) return no_data(Errc::kNotYet);
+  if (beyond > query.extrapolate.count() || beyond > edge.samples->reach(edge.number)) {
+    return no_data(Errc::kNotYet);
+  }
   const Sample* before =
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr;
   const Sample* newest = edge.samples->sample(edge.number);

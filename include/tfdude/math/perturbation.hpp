@@ -30,9 +30,9 @@ namespace tfdude {
 [[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X,
                                                           const StatedCovariance& ros);
 
-/// The standard deviations that stand beside the numbers of X_AB: of B's origin along the axes of A,
-/// as its coordinates [m], then of the rotation about the axes of B [rad]. Of the specified edges, if
-/// the covariance is not complete. First order, as ros_covariance().
+/// The standard deviations that stand beside the numbers of X_AB: of B's origin along the axes of
+/// A, as its coordinates [m], then of the rotation about the axes of B [rad]. Of the specified
+/// edges, if the covariance is not complete. First order, as ros_covariance().
 [[nodiscard]] TFDUDE_EXPORT std::array<double, 6> stddev_in_parent(const Transform& X_AB);
 
 /// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ; for any angle. Uses its power

@@ -78,7 +78,7 @@ TEST_CASE("a transform is printed in metres and radians unless degrees are asked
 }
 
 TEST_CASE("deviations stand beside the coordinates that they are of") {
-  // Turned by 90 degrees about z: B's x is A's y. The error is 1 mm along B's x, 100 mm along its y.
+  // Turned by 90 degrees about z: B's x is A's y.
   const Transform X{*Pose::create({std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 2, 0}),
                     *Covariance::from_stddev({0.001, 0.1, 0.002, 0.01, 0.02, 0})};
   CHECK_THAT(
