@@ -61,6 +61,7 @@ json lookup_json(const std::string& a, const std::string& b, const Transform& X_
               {"rotation", numbers_json(X_AB.pose.rotation().coeffs())},
               {"partitions", partitions}};
   add_covariance(object, X_AB.covariance);
+  object["covariance_axes"] = b;
   return object;
 }
 

@@ -4,6 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/belief.hpp"
+#include "tfdude/math/perturbation.hpp"
 
 #include "format.hpp"
 #include "quantities.hpp"
@@ -48,6 +49,17 @@ std::string unspecified_text(const std::vector<std::string>& edges) {
   return "unspecified for " + printable(joined(edges));
 }
 
+std::string assumed_text(const std::vector<std::string>& joints) {
+  if (joints.empty()) return {};
+  return std::to_string(joints.size()) +
+         (joints.size() == 1 ? " joint has had no sample: " : " joints have had no sample: ") +
+         printable(joined(joints));
+}
+
+std::string assumed_line(const std::vector<std::string>& joints) {
+  return joints.empty() ? "" : "assumed      " + assumed_text(joints) + "\n";
+}
+
 std::string rows_text(const Eigen::MatrixXd& matrix) {
   std::string text;
   for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
@@ -70,20 +82,18 @@ std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles) {
 std::string describe(const Transform& X_AB, const Shown& shown,
                      const std::vector<std::string>& unspecified) {
   std::string text = describe_pose(X_AB.pose, shown);
-  const auto s = X_AB.covariance.of_specified().stddev();
+  const auto s = stddev_in_parent(X_AB);
   const bool complete = X_AB.covariance.complete();
   if (!complete) text += "std dev      " + unspecified_text(unspecified) + "\n";
-  const std::string deviations =
-      format(complete ? "std dev      %.6f  %.6f  %.6f  m" : "  of others  %.6f  %.6f  %.6f  m",
-             s[0], s[1], s[2]);
-  const std::string angles = angles_text(s[3], s[4], s[5], shown.angles);
-  const bool fits = deviations.size() + 3 + angles.size() <= 80;
-  text += deviations + (fits ? "   " : "\n             ") + angles + "\n";
+  text += format("%s%.6f  %.6f  %.6f  m    %s\n", complete ? "std dev      " : "  of others  ",
+                 s[0], s[1], s[2], kAxesOfTranslation);
+  text +=
+      "             " + angles_text(s[3], s[4], s[5], shown.angles) + "  " + kAxesOfRotation + "\n";
   if (!shown.covariance) return text;
   text += std::string("covariance   ") +
-          (complete ? "(translation first, of the right perturbation; m, "
-                    : "of the others (translation first, right perturbation; m, ") +
-          shown.angles.name + ")\n";
+          (complete ? "(right perturbation, translation first, "
+                    : "of the others (translation first, ") +
+          "in the axes of B; m, " + shown.angles.name + ")\n";
   return text + matrix_table(X_AB.covariance.of_specified().matrix(), shown.angles);
 }
 

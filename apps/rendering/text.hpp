@@ -21,6 +21,10 @@ struct Shown {
   bool matrix = false;      ///< the pose as a homogeneous matrix
 };
 
+/// Whose axes the standard deviations of a pose of B in A have: see stddev_in_parent().
+inline constexpr const char* kAxesOfTranslation = "along the axes of A";
+inline constexpr const char* kAxesOfRotation = "about the axes of B";
+
 /// @param unspecified  the edges whose covariance is unspecified
 [[nodiscard]] std::string describe(const Transform& X_AB, const Shown& shown,
                                    const std::vector<std::string>& unspecified = {});
@@ -28,6 +32,10 @@ struct Shown {
 [[nodiscard]] std::string describe(const Basis& basis);
 /// "unspecified for odom, base"
 [[nodiscard]] std::string unspecified_text(const std::vector<std::string>& edges);
+/// "2 joints have had no sample: pan, lift"; empty if there are none.
+[[nodiscard]] std::string assumed_text(const std::vector<std::string>& joints);
+/// The same as a line of an answer.
+[[nodiscard]] std::string assumed_line(const std::vector<std::string>& joints);
 
 /// A table of the covariance, whose last three rows and columns are of angles.
 [[nodiscard]] std::string matrix_table(const Matrix6d& sigma, const AngleUnit& angles);

@@ -1,6 +1,7 @@
 #include "path.hpp"
 
 #include <optional>
+#include <set>
 
 #include "../rendering/json.hpp"
 #include "../rendering/text.hpp"
@@ -32,16 +33,36 @@ void Path::add_printing(CLI::App& app) {
   explain_angles(app);
 }
 
+std::vector<std::string> assumed_joints(Source source, const std::string& a, const std::string& b,
+                                        const std::vector<std::string>& unspecified) {
+  std::set<std::string> names;
+  if (unspecified.empty()) return {};
+  const auto path = source.path(a, b);
+  const std::set<std::string> moved(unspecified.begin(), unspecified.end());
+  std::set<std::string> asked;
+  for (const PathSegment& segment : path.value_or(std::vector<PathSegment>())) {
+    if (!asked.insert(segment.partition).second) continue;
+    const auto joints = source.joints(segment.partition);
+    if (!joints) continue;
+    for (const JointInfo& joint : *joints) {
+      if (joint.measured || moved.count(joint.frame) == 0) continue;
+      names.insert(joint.mimic ? joint.mimic->joint : joint.name);
+    }
+  }
+  return {names.begin(), names.end()};
+}
+
 nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
   const auto path = source.path(a, b).value_or(std::vector<PathSegment>());
   auto object = lookup_json(a, b, X_AB, path);
+  object["assumed_joints"] = assumed_joints(source, a, b, X_AB.basis.unspecified);
   if (matrix) object["matrix"] = matrix_json(X_AB.pose.matrix());
   return object;
 }
 
 std::string Path::text(Source source, const Common& common, const StampedTransform& X_AB) const {
-  const std::string text =
-      describe(X_AB, {common.angles, covariance, matrix}, X_AB.basis.unspecified);
+  std::string text = describe(X_AB, {common.angles, covariance, matrix}, X_AB.basis.unspecified);
+  text += assumed_line(assumed_joints(source, a, b, X_AB.basis.unspecified));
   return text + stamp_line(source, common, a, b, X_AB.stamp);
 }
 

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -31,6 +32,12 @@ struct Path {
   bool covariance = false;  ///< print the full one
   bool matrix = false;      ///< print the pose as a matrix
 };
+
+/// The joints that move unspecified edges of the path, and have had no sample: their positions are
+/// assumed. Each by the name that samples have. Asks the owners, unless all edges are specified.
+[[nodiscard]] std::vector<std::string> assumed_joints(Source source, const std::string& a,
+                                                      const std::string& b,
+                                                      const std::vector<std::string>& unspecified);
 
 /// Adds --cov alone.
 void add_covariance_flag(CLI::App& app, bool& covariance);

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "tfdude/math/transform_spec.hpp"
 #include "tfdude/types/version.hpp"
 
 #include "../command_line.hpp"
@@ -129,6 +130,12 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
                "what would change in the state, and write nothing; also whether several "
                "configurations fit together");
   const UrdfOptions urdfs(app);
+  std::string covariance;
+  auto* stated =
+      app.add_option("--covariance", covariance,
+                     "of all edges of --urdf that no joint moves: unspecified, or exact; "
+                     "default: that of --config, or else unspecified");
+  stated->check(CLI::IsMember({"unspecified", "exact"}));
   cli::add_network_options(app, arguments.options);
   cli::add_clock_option(app, [&](ClockKind kind) { arguments.clock = kind; });
   auto* state = app.add_option("--state", arguments.options.state,
@@ -160,6 +167,12 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
         "The target tfdude.target stands for all of these services."}},
       [&] {
         arguments.urdfs = urdfs.parts();
+        if (!covariance.empty() && arguments.urdfs.empty()) {
+          throw CLI::ValidationError("--covariance",
+                                     "needs --urdf; a configuration has the key "
+                                     "covariance");
+        }
+        if (!covariance.empty()) arguments.covariance = *covariance_named(covariance);
         set_configs(configs, arguments);
       });
   if (status) return status;

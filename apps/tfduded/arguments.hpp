@@ -15,6 +15,8 @@ struct Arguments {
   std::string config;
   std::vector<std::string> further;  ///< configurations to check together with it
   std::vector<UrdfPart> urdfs;
+  /// Of their edges that have none, instead of that of the configuration.
+  std::optional<StatedCovariance> covariance;
   bool check = false;  ///< only print what the configuration would change
   std::optional<ClockKind> clock;
   Options options;

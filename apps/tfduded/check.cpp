@@ -111,6 +111,30 @@ void print_needs(const std::vector<Frame>& served) {
 
 }  // namespace
 
+std::string unspecified_edges(const Config& config) {
+  std::size_t all = 0;
+  std::size_t fixed = 0;
+  std::size_t moved = 0;
+  for (const FrameSpec& frame : config.frames) {
+    if (frame.parent.empty()) continue;
+    ++all;
+    if (!frame.X_PC.covariance.complete()) ++(frame.joint ? moved : fixed);
+  }
+  if (fixed + moved == 0) return {};
+  std::string text = std::to_string(fixed + moved) + " of " + number_of(all, "edge") +
+                     " without covariance, so no lookup over them has one";
+  if (fixed > 0) {
+    text +=
+        ": write --covariance exact for --urdf, or covariance: exact in the configuration, if " +
+        std::to_string(fixed) + " of them are known exactly, otherwise the stddev of each";
+  }
+  if (moved > 0) {
+    text += "; " + number_of(moved, "joint") + (moved == 1 ? " has" : " have") +
+            " none until the first sample with a variance, or give a stddev and sample_stddev";
+  }
+  return text;
+}
+
 int check(const Arguments& arguments, const Config& config) {
   const Options& options = arguments.options;
   const auto preview = preview_config(config.partition, config.frames, options);
@@ -124,6 +148,7 @@ int check(const Arguments& arguments, const Config& config) {
   print_sources(config);
   print_state(*preview);
   print_needs(preview->served);
+  if (const std::string line = unspecified_edges(config); !line.empty()) std::puts(line.c_str());
   if (auto ok = check_keys(options.keys, config.partition, options.domain); !ok) {
     spdlog::error("{}", ok.error().message);
     return cli::kWrongUsage;

@@ -14,6 +14,9 @@ namespace tfdude::daemon {
 /// @return the exit status: 0, or cli::kWrongUsage if the daemon would not start
 [[nodiscard]] int check(const Arguments& arguments, const Config& config);
 
+/// How many of the edges have no covariance, and what to write; empty if all have one.
+[[nodiscard]] std::string unspecified_edges(const Config& config);
+
 /// What is wrong with the configurations of a robot's daemons if they run together: a partition, a
 /// frame or a joint of two of them, a parent or a mimicked joint that none has, a cycle. Messages
 /// name the places.

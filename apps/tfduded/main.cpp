@@ -33,7 +33,8 @@ tfdude::Result<tfdude::Config> configure(const Arguments& arguments) {
     config = *std::move(loaded);
   }
   for (tfdude::UrdfPart part : arguments.urdfs) {
-    part.fixed = config.covariance;
+    part.fixed = arguments.covariance.value_or(config.covariance);
+    part.X_root.covariance = part.fixed;
     if (auto ok = tfdude::add_urdf(config, part); !ok) return tl::unexpected(ok.error());
   }
   if (config.partition.empty()) config.partition = arguments.partition;
@@ -96,6 +97,9 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
     const auto code = node.error().code;
     return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRejected;
+  }
+  if (const auto line = tfdude::daemon::unspecified_edges(*config); !line.empty()) {
+    spdlog::info("partition {}: {}", tfdude::quote(config->partition), line);
   }
   std::printf("ready partition=%s frames=%zu\n", config->partition.c_str(), node->own_frames());
   std::fflush(stdout);

@@ -62,7 +62,7 @@ def main() -> None:
     with tfdude.Node("arm", frames, network=tfdude.LoopbackNetwork()) as node:
         publish(node, arguments.joints, arguments.seconds)
         X = node.lookup("base", frames[-1].id)
-        print(f"{frames[-1].id} at {X.translation} m, ±{1000 * X.stddev[:3].max():.2f} mm")
+        print(f"{frames[-1].id} at {X.translation} m, ±{1000 * X.stddev_in_parent[:3].max():.2f} mm")
 
 
 if __name__ == "__main__":

@@ -61,8 +61,9 @@ std::string text_of(const Transform& X, const std::string& name) {
   } else if (X.covariance == StatedCovariance::exact()) {
     text += ", covariance='exact'";
   } else {
-    text += ", stddev=";
-    const std::array<double, 6> s = X.covariance.of_specified().stddev();
+    const std::array<double, 6> s = stddev_in_parent(X);
+    // The name says so where the child has other axes than the parent.
+    text += s == X.covariance.of_specified().stddev() ? ", stddev=" : ", stddev_in_parent=";
     list({s[0], s[1], s[2], s[3], s[4], s[5]});
   }
   return text + ")";
@@ -153,8 +154,17 @@ void bind_parts(py::class_<Transform>& cls) {
         return read_only(self.cast<const Transform&>().covariance.of_specified().stddev().data(),
                          {6});
       },
-      "Square roots of the covariance's diagonal (6,): three [m], three [rad]. Raises\n"
-      "UnspecifiedCovariance.");
+      "Square roots of the covariance's diagonal (6,): three [m], three [rad], along and about "
+      "the\n"
+      "axes of the child. Raises UnspecifiedCovariance.");
+  cls.def_property_readonly(
+      "stddev_in_parent",
+      [](py::handle self) {
+        require_complete(self);
+        return read_only(stddev_in_parent(self.cast<const Transform&>()).data(), {6});
+      },
+      "What stands beside the numbers (6,): of the translation along the axes of the parent [m],\n"
+      "then of the rotation about the axes of the child [rad]. Raises UnspecifiedCovariance.");
   cls.def_property_readonly(
       "left_covariance",
       [](py::handle self) {

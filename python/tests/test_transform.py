@@ -44,7 +44,7 @@ def test_default_is_identity_of_unspecified_covariance():
 
 def test_unspecified_covariance_cannot_be_overlooked():
     X = Transform((1, 2, 3))
-    for name in ("covariance", "stddev", "left_covariance", "ros_covariance"):
+    for name in ("covariance", "stddev", "stddev_in_parent", "left_covariance", "ros_covariance"):
         with pytest.raises(tfdude.UnspecifiedCovariance):
             getattr(X, name)
     assert np.array_equal(X.covariance_of_specified, np.zeros((6, 6)))
@@ -230,6 +230,15 @@ def test_equality_and_text():
     assert "covariance='unspecified'" in repr(Transform())
     assert "-0" not in repr(Transform([-0.0, 0, 1], [0, -0.0, 0, 1]))
     assert X.with_covariance(None) == Transform((1, 2, 3))
+
+
+def test_deviations_beside_coordinates():
+    # Turned by 90 degrees about z: the child's x is the parent's y.
+    X = Transform((1, 2, 0), [0, 0, 0.5**0.5, 0.5**0.5], stddev=[0.001, 0.1, 0.002, 0.01, 0.02, 0.03])
+    assert np.allclose(X.stddev_in_parent, [0.1, 0.001, 0.002, 0.01, 0.02, 0.03])
+    assert np.allclose(X.stddev_in_parent[:3], np.sqrt(np.diag(X.ros_covariance))[:3])
+    assert "stddev_in_parent=[0.1" in repr(X)
+    assert "stddev=" not in repr(X)
 
 
 GERMAN = """

@@ -153,13 +153,6 @@ Result<void> EdgeReader::read_limits(Index i, JointSpec& joint) const {
   return tree_.joint_error(i, "limits " + both + " are beyond 1e9");
 }
 
-// The limits, if there is one at each end; otherwise none.
-std::optional<JointLimits> range_of(const JointSpec& joint) {
-  const auto& limits = joint.limits;
-  const bool open = limits && (limits->lower <= -kLargest || limits->upper >= kLargest);
-  return open ? std::nullopt : limits;
-}
-
 Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
   const UrdfJoint& said = said_of(i);
   if (urdf_of(i).mimic) {
@@ -181,8 +174,7 @@ Result<void> EdgeReader::read_position(Index i, JointSpec& joint) const {
     if (!stddev || (*stddev >= 0 && is_sane(*stddev))) continue;
     return tree_.joint_error(i, "stddev " + number_text(*stddev) + " is not within 0 and 1e9");
   }
-  joint.variance = said.stddev ? *said.stddev * *said.stddev
-                               : unmeasured_variance(joint.type, range_of(joint), joint.position);
+  if (said.stddev) joint.variance = *said.stddev * *said.stddev;
   if (said.sample_stddev) joint.sample_variance = *said.sample_stddev * *said.sample_stddev;
   return {};
 }

@@ -1,5 +1,7 @@
 #include "tfdude/math/perturbation.hpp"
 
+#include <algorithm>
+
 namespace tfdude {
 namespace {
 
@@ -22,6 +24,13 @@ StatedCovariance ros_covariance(const Transform& X) {
 
 Transform from_ros_covariance(const Pose& X, const StatedCovariance& ros) {
   return {X, ros.transported(turning(X.rotation().conjugate()))};
+}
+
+std::array<double, 6> stddev_in_parent(const Transform& X_AB) {
+  std::array<double, 6> stddev = X_AB.covariance.of_specified().stddev();
+  const std::array<double, 6> along_A = ros_covariance(X_AB).of_specified().stddev();
+  std::copy_n(along_A.begin(), 3, stddev.begin());
+  return stddev;
 }
 
 Matrix6d small_adjoint(const Twist& xi) {

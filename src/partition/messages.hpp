@@ -73,6 +73,8 @@ struct LookupRequest {
   /// Another instant at which the answer may be useful; see LatestHints.
   std::optional<Time> hint{};
   bool edges = false;  ///< each segment is an edge to be observed: its full correlation is needed
+  /// A velocity is computed from the answer, so stamps that the owner has made up do not count.
+  bool timed = false;
 };
 
 /// The result of an observation for the edges of one owner.

@@ -132,6 +132,10 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   Reply reply;
   reply.sequence = sequence;
   auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges);
+  if (values && lookup.timed && lookup.query.at) {
+    auto timed = forest_.check_timed(lookup.segments, *lookup.query.at);
+    if (!timed) values = tl::unexpected(std::move(timed.error()));
+  }
   if (values && are_too_many(values->correlations)) {
     reply.body = Error{Errc::kInvalidInput, "partition " + quote(name_) + " has more than " +
                                                 std::to_string(kMaxCorrelated) +
@@ -139,7 +143,8 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
   } else if (values) {
     values->incarnation = pages_.incarnation();
     reply.body = *std::move(values);
-  } else if (values.error().code == Errc::kNotYet || values.error().code == Errc::kTooOld) {
+  } else if (const Errc code = values.error().code;
+             code == Errc::kNotYet || code == Errc::kTooOld || code == Errc::kInvalidInput) {
     values.error().message.insert(0, "partition " + quote(name_) + ": ");
     reply.body = std::move(values.error());
   } else {

@@ -17,7 +17,11 @@ namespace {
 // The same requests at another instant.
 std::vector<Part> parts_at(const std::vector<Part>& parts, Time at) {
   std::vector<Part> then = parts;
-  for (Part& part : then) std::get<LookupRequest>(part.request.body).query.at = at;
+  for (Part& part : then) {
+    auto& request = std::get<LookupRequest>(part.request.body);
+    request.query.at = at;
+    request.timed = true;
+  }
   return then;
 }
 

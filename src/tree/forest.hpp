@@ -251,6 +251,12 @@ class Forest {
                                                       std::optional<Time> hint = std::nullopt,
                                                       bool edges = false) const;
 
+  /// Whether the motion of such segments around an instant is known by stamps that came with the
+  /// samples.
+  /// @return kUnknownStart, kUnknownEnd; kInvalidInput naming an edge whose owner has made up
+  ///   stamps around the instant or after it, as its samples came without: those tell no velocity
+  [[nodiscard]] Result<void> check_timed(const std::vector<PathEnds>& segments, Time at) const;
+
   /// The values of such segments at their latest common time, after those at earlier instants
   /// at which an edge has a sample, and that are not known from `seen`. All are of one commit. If
   /// the history of an edge was cleared, the last one says that there are no values.

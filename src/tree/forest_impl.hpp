@@ -96,6 +96,11 @@ class Forest::Impl {
   /// for all times.
   void push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
+  /// The stamp of the edge's newest sample is made up.
+  void mark_made_up(std::uint32_t slot) TFDUDE_REQUIRES(mutex_) {
+    const HeldVersion& edge = frames_.newest_value(slot);
+    edge.samples->set_made_up(edge.number);
+  }
   /// Makes the fresh version static and clears its history, but keeps its timing.
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Pushes a version of a dynamic edge without any sample.

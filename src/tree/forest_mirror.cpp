@@ -51,6 +51,10 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
   if (value.stamp) {
     const bool taken =
         push_told_sample(frames_.newest_value(slot), value.X, nanoseconds(*value.stamp), replace);
+    const HeldVersion& newest = frames_.newest_value(slot);
+    if (value.made_up && newest.moving() && newest.stamp == nanoseconds(*value.stamp)) {
+      mark_made_up(slot);
+    }
     return taken || value.process_noise;
   }
   if (value.process_noise) return true;

@@ -131,6 +131,7 @@ void Telling::tell_newest(std::uint64_t seen) {
   const Sample* newest = samples.sample(edge_.number);
   if (newest != nullptr && newest->commit <= seen) return;
   tell(time_of(edge_.stamp), newest_of(edge_));
+  values_.back().made_up = samples.made_up(edge_.number);
   if (seen == 0 || newest == nullptr) return;
   const Sample* before = newest;
   for (std::uint64_t number = edge_.number; before != nullptr && before->commit > seen; --number) {
@@ -152,6 +153,7 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
       // The edge's version may be newer than the sample that it shows.
       tell(time_of(sample->stamp),
            number == edge_.number ? newest_of(edge_) : value_of(edge_, *sample));
+      values_.back().made_up = samples.made_up(number);
     }
     before = sample;
   }

@@ -2,6 +2,8 @@
 #include <limits>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
 #include "tree/held_edges.hpp"
@@ -303,6 +305,21 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
   }
   all.push_back(*std::move(newest));
   return all;
+}
+
+Result<void> Forest::check_timed(const std::vector<PathEnds>& segments, Time at) const {
+  const epoch::Guard guard;
+  const auto ends = all_ends(impl_->frames_, segments);
+  if (!ends) return tl::unexpected(ends.error());
+  const HeldVersion* untimed = nullptr;
+  for_each_held(*ends, [&](const HeldVersion& edge) {
+    if (!edge.moving() || edge.lacks_sample()) return;
+    if (!edge.samples->is_timed_since(nanoseconds(at), edge.number)) untimed = &edge;
+  });
+  if (untimed == nullptr) return {};
+  return fail(Errc::kInvalidInput,
+              "the edge of " + quote(untimed->name->text) +
+                  " has samples that came without a stamp: when they arrived tells no velocity");
 }
 
 bool Forest::have_noise(const std::vector<PathEnds>& segments) const {

@@ -163,7 +163,9 @@ Result<void> Forest::Impl::update_one(const HeldVersion& edge, const Transform& 
     if (stamp) {
       if (auto ok = check_sample(edge, *at); !ok) return ok;
     }
-    push_value(edge.slot, {X_PC}, *at);
+    const std::uint32_t slot = edge.slot;
+    push_value(slot, {X_PC}, *at);
+    if (!stamp && *at != kAlways) mark_made_up(slot);
   } else {
     end_revision(push_held(edge.slot, X_PC));
   }
@@ -230,6 +232,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
     reclaimer_.prefetch_held(kPrefetched);
     const std::uint32_t slot = to_update_[i]->slot;
     push_value(slot, {edges[i].X_PC, state_of(edges[i])}, *at);
+    if (!stamp && *at != kAlways) mark_made_up(slot);
     if (const Correlation* said = correlation_of(edges[i])) say_correlation(slot, *said);
   }
   commit();

@@ -18,6 +18,7 @@ struct DatedEdge {
   const HeldVersion* edge = nullptr;
   std::int64_t oldest = 0;
   std::int64_t newest = 0;
+  std::int64_t reach = 0;  // how far it can be extrapolated
 
   [[nodiscard]] std::string name() const { return "the edge of " + quote(edge->name->text); }
 };
@@ -25,7 +26,8 @@ struct DatedEdge {
 DatedEdge dated(const HeldVersion& edge) {
   // The oldest may be dropped meanwhile, but there always is a newest.
   const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
-  return {&edge, oldest == kAlways ? edge.stamp : std::min(oldest, edge.stamp), edge.stamp};
+  return {&edge, oldest == kAlways ? edge.stamp : std::min(oldest, edge.stamp), edge.stamp,
+          edge.samples->reach(edge.number)};
 }
 
 std::vector<DatedEdge> dynamic_edges(const std::vector<Ends>& segments) {
@@ -86,7 +88,16 @@ std::string beyond(const DatedEdge& edge, std::int64_t t, const Query& query) {
   if (query.extrapolate.count() == 0) return text;
   if (t - edge.newest > query.extrapolate.count())
     return text + ", and the extrapolation limit is " + readable(query.extrapolate);
-  return text + ", and the only one: cannot extrapolate";
+  if (edge.oldest == edge.newest) return text + ", and the only one: cannot extrapolate";
+  if (edge.reach == 0) {
+    return text +
+           ", and a stamp of its last two is that of their arrival: this tells no velocity by "
+           "which "
+           "to extrapolate";
+  }
+  return text + ", and its last two samples are too close together to extrapolate by more than " +
+         (edge.reach < 1'000'000 ? std::to_string(edge.reach) + " ns"
+                                 : readable(std::chrono::nanoseconds(edge.reach)));
 }
 
 // The edge with the oldest newest sample, of those that cannot be extrapolated until t.
@@ -95,7 +106,7 @@ const DatedEdge& first_to_end(const std::vector<DatedEdge>& edges, const DatedEd
   const DatedEdge* found = nullptr;
   for (const DatedEdge& one : edges) {
     const bool ends =
-        t > one.newest && (t - one.newest > query.extrapolate.count() || one.oldest == one.newest);
+        t > one.newest && t - one.newest > std::min(query.extrapolate.count(), one.reach);
     if (ends && (found == nullptr || one.newest < found->newest)) found = &one;
   }
   return found != nullptr ? *found : slowest;

@@ -63,7 +63,10 @@ struct Newest {
 // Those of the edge, if it may be extrapolated so far.
 Result<Newest> newest_of(const HeldVersion& edge, std::int64_t t, const Query& query) {
   if (edge.lacks_sample()) return no_data(Errc::kNotYet);
-  if (t - edge.stamp > query.extrapolate.count()) return no_data(Errc::kNotYet);
+  const std::int64_t beyond = t - edge.stamp;
+  if (beyond > query.extrapolate.count() || beyond > edge.samples->reach(edge.number)) {
+    return no_data(Errc::kNotYet);
+  }
   const Newest found{
       edge.number > edge.samples->oldest() ? edge.samples->sample(edge.number - 1) : nullptr,
       edge.samples->sample(edge.number)};

@@ -37,6 +37,8 @@ struct PushedValue {
   std::uint32_t covariance_number = 0;
   /// The covariance of this number was pushed before, and X comes without it.
   bool covariance_known = false;
+  /// Its owner has made up the stamp, so it tells no velocity. Only with the newest such sample.
+  bool made_up = false;
   /// The history was cleared: the edge is dynamic, and has no value until its next sample.
   bool cleared = false;
   /// The edge is dynamic, and had no sample yet: the value is that of no instant.

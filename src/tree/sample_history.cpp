@@ -54,6 +54,23 @@ SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newes
   return before != nullptr ? Bracket{before, after} : Bracket{};
 }
 
+std::int64_t SampleHistory::reach(std::uint64_t newest) const {
+  // An error of a sample is twice as many times as large there.
+  constexpr std::int64_t kMostIntervals = 100;
+  if (newest <= oldest() || made_up_end_.load(std::memory_order_relaxed) >= newest) return 0;
+  const Sample* before = sample(newest - 1);
+  const Sample* after = sample(newest);
+  if (before == nullptr || after == nullptr) return 0;
+  const std::int64_t interval = after->stamp - before->stamp;
+  return interval > INT64_MAX / kMostIntervals ? INT64_MAX : kMostIntervals * interval;
+}
+
+bool SampleHistory::is_timed_since(std::int64_t t, std::uint64_t newest) const {
+  const std::uint64_t end = made_up_end_.load(std::memory_order_relaxed);
+  if (end <= oldest()) return true;
+  return end <= newest && stamp(end) <= t;
+}
+
 Transform SampleHistory::value_between(const Sample& before, const Sample& after,
                                        std::int64_t t) const {
   const auto span = static_cast<double>(after.stamp - before.stamp);
@@ -109,6 +126,7 @@ std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
   const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
   copy->left_behind = left_behind;
+  copy->made_up_end_.store(made_up_end_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   copy->first_.store(first, std::memory_order_relaxed);
   copy->next_ = std::max(first, end);
   for (std::uint64_t number = first; number < end; number += kSize - number % kSize) {
@@ -123,6 +141,7 @@ std::unique_ptr<SampleHistory> SampleHistory::grown() const { return copy(2 * (m
 std::unique_ptr<SampleHistory> SampleHistory::with(const Sample& sample, std::uint64_t place,
                                                    SampleStore& store) const {
   auto with_one = copy(full() ? 2 * (mask_ + 1) : mask_ + 1, place - place % kSize);
+  if (place < made_up_end_.load(std::memory_order_relaxed)) ++with_one->made_up_end_;
   for (std::uint64_t number = with_one->next_; number < next_; ++number) {
     if (number == place) with_one->add(store) = sample;
     with_one->add(store) = *at(number);

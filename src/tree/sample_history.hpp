@@ -44,6 +44,20 @@ class SampleHistory {
   [[nodiscard]] Transform value_between(const Sample& before, const Sample& after,
                                         std::int64_t t) const;
 
+  /// How far beyond its newest sample the edge may be extrapolated [ns]: as far as the two newest
+  /// samples that the reader sees carry it. 0: it cannot be, as there is only one, or as the owner
+  /// has made up a stamp of them.
+  [[nodiscard]] std::int64_t reach(std::uint64_t newest) const;
+
+  /// Whether what the edge did around an instant, up to its newest sample, is known by stamps that
+  /// came with the samples.
+  [[nodiscard]] bool is_timed_since(std::int64_t t, std::uint64_t newest) const;
+
+  /// Whether its owner has made up the stamp of this sample, which is the newest of those.
+  [[nodiscard]] bool made_up(std::uint64_t number) const {
+    return made_up_end_.load(std::memory_order_relaxed) == number + 1;
+  }
+
   /// Null if the sample is not kept any more.
   [[nodiscard]] const Sample* sample(std::uint64_t number) const {
     const std::uint64_t index = number / SampleChunk::kSize;
@@ -85,6 +99,12 @@ class SampleHistory {
   [[nodiscard]] bool has_instants(std::uint64_t place) const {
     return place > oldest() && place < next_ &&
            !instants_between(*at(place - 1), *at(place)).empty();
+  }
+
+  /// The stamp of this sample, the newest, is one that its owner has made up: when it arrived. The
+  /// time between such stamps was not measured, so it tells no velocity.
+  void set_made_up(std::uint64_t number) {
+    made_up_end_.store(number + 1, std::memory_order_relaxed);
   }
 
   /// The number for a sample with this stamp; samples from that number on are later.
@@ -194,6 +214,8 @@ class SampleHistory {
   const bool has_noise_;
   const std::uint64_t mask_;
   std::atomic<std::uint64_t> first_{0};
+  // The stamps of samples from this number on came with them.
+  std::atomic<std::uint64_t> made_up_end_{0};
   std::uint64_t next_ = 0;
   Ends ends_;
   // NOLINTNEXTLINE(modernize-avoid-c-arrays): atomics cannot be moved

@@ -83,13 +83,4 @@ double rest_position(const std::optional<JointLimits>& limits) {
   return limits ? std::clamp(0.0, limits->lower, limits->upper) : 0.0;
 }
 
-std::optional<double> unmeasured_variance(JointType type, const std::optional<JointLimits>& limits,
-                                          double position) {
-  if (!limits && type == JointType::kPrismatic) return std::nullopt;
-  if (!limits) return kPi * kPi / 3.0;
-  const double range = limits->upper - limits->lower;
-  const double off = 0.5 * (limits->upper + limits->lower) - position;
-  return range * range / 12.0 + off * off;
-}
-
 }  // namespace tfdude

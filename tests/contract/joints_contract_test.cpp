@@ -1,8 +1,11 @@
 // Joints over partitions, over each transport.
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -12,6 +15,8 @@
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/client/watch.hpp"
+#include "tfdude/recording/recording.hpp"
+#include "tfdude/recording/recording_writer.hpp"
 
 #include "support/catch.hpp"
 #include "support/joint_frames.hpp"
@@ -259,6 +264,85 @@ TEST_CASE("joints: between positions far apart all participants see the way of t
       (void)comes_true([&] { return difference(watch, t) == ""; });
       CHECK(difference(watch, t) == "");
     }
+  }
+}
+
+TEST_CASE("joints: a continuous joint goes the shorter way wherever it is seen") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  JointSpec wheel = revolute_named("wheel");
+  wheel.type = JointType::kContinuous;
+  wheel.limits.reset();
+  wheel.coupled = true;
+  JointSpec gear = following("gear", "wheel", 2, 0);
+  gear.limits.reset();
+  gear.mimic->of_continuous = true;
+  const auto base =
+      Node::open(join("base"), "base", {{"world", "", {}}, moved_by("rim", "world", wheel)})
+          .value();
+  const auto tool = Node::open(join("tool"), "tool", {moved_by("hand", "rim", gear)}).value();
+  auto client = Client::open(join("")).value();
+  const testing::TemporaryDirectory directory;
+  const std::string file = directory.path() + "/wheel.mcap";
+  const auto at = [](double seconds) { return Time(Milliseconds(std::lround(1000 * seconds))); };
+  // As a driver reports them, and all turns that the wheel has made.
+  const std::vector<double> reported{3.0, -3.0, -0.5, 1.9, -2.4};
+  std::vector<double> turned{reported.front()};
+  for (std::size_t i = 1; i < reported.size(); ++i) {
+    const double step = reported[i] - reported[i - 1];
+    turned.push_back(turned.back() + std::remainder(step, 2 * std::acos(-1.0)));
+  }
+  std::mutex mutex;
+  std::map<std::optional<Time>, int> values;  // how many were told, by their stamps
+  auto writer = RecordingWriter::create(file, at(0)).value();
+  const auto write = [&](const PartitionNews& news) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    const auto* told = std::get_if<ValuesNews>(&news.what);
+    REQUIRE(writer.add(
+        news, told != nullptr && told->values.back().stamp ? *told->values.back().stamp : at(0)));
+    if (told == nullptr) return;
+    for (const WatchedValue& one : told->values) ++values[one.stamp];
+  };
+  const auto are_told = [&](const std::optional<Time>& stamp) {
+    return comes_true([&] {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return values[stamp] >= 2;
+    });
+  };
+  const auto watch = client.watch("world", "hand").value();
+  {
+    std::vector<PartitionWatch> recorded;
+    for (const char* name : {"base", "tool"}) {
+      recorded.push_back(client.watch_partition(name, {0, write}).value());
+    }
+    // The values at rest; then each sample before the next one.
+    REQUIRE(are_told(std::nullopt));
+    for (std::size_t i = 0; i < reported.size(); ++i) {
+      const Time stamp = at(1 + static_cast<double>(i));
+      REQUIRE(client.update_joints({"wheel"}, {reported[i]}, {4e-4}, stamp));
+      REQUIRE(are_told(stamp));
+      REQUIRE(comes_true([&] { return watch.latest() && watch.latest()->stamp == stamp; }));
+    }
+  }
+  REQUIRE(writer.finish(at(5)));
+  auto recording = Recording::open(file).value();
+  for (double t = 1; t < 5.6; t += 0.05) {
+    INFO("at " << t << " s");
+    const auto i = std::min(static_cast<std::size_t>(t - 1), reported.size() - 2);
+    const double angle = turned[i] + (t - 1 - static_cast<double>(i)) * (turned[i + 1] - turned[i]);
+    const Query query{at(t), std::chrono::seconds(1), {}};
+    recording.seek(at(5));
+    for (const auto& [a, b, ratio] : {std::tuple{"world", "rim", 1.0}, {"rim", "hand", 2.0}}) {
+      const auto off = [&, ratio = ratio](const Result<StampedTransform>& X) {
+        return std::abs(std::remainder(yaw(X) - ratio * angle, 2 * std::acos(-1.0)));
+      };
+      CHECK(off(client.lookup(a, b, query)) < 1e-9);
+      CHECK(off(recording.lookup(a, b, query)) < 1e-9);
+    }
+    const auto X = client.lookup("world", "hand", query);
+    const auto Y = watch.lookup(query);
+    REQUIRE(X);
+    REQUIRE(Y);
+    CHECK(testing::pose_diff(Y->pose, X->pose, 1e-9) == "");
   }
 }
 

@@ -11,6 +11,7 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/networks.hpp"
+#include "support/process.hpp"
 
 namespace tfdude {
 namespace {
@@ -138,6 +139,30 @@ TEST_CASE("velocity: common errors of static edges cancel, and those of dynamic 
     CHECK(velocity->linear.norm() < 1e-12);
     CHECK(velocity->covariance.if_complete()->stddev()[0] == Approx(2 * 0.01 / 0.1));
   }
+}
+
+TEST_CASE("velocity: times of arrival tell none") {
+  const Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  EdgeTiming moving;
+  moving.moving = true;
+  auto node =
+      Node::open(join("arm"), "arm", {{"world", "", {}}, {"arm", "world", along_x(0), moving}})
+          .value();
+  auto client = Client::open(join("")).value();
+  const auto watch = client.watch("world", "arm").value();
+  REQUIRE(client.update("arm", along_x(1)));
+  REQUIRE(client.update("arm", along_x(2)));
+  const Time newest = *client.lookup("world", "arm", Query{})->stamp;
+  REQUIRE(testing::eventually([&] { return watch.latest() && watch.latest()->stamp == newest; }));
+  const Query beyond{newest + 1ms, 1s, {}};
+  for (Client* caller : {&client, static_cast<Client*>(&node)}) {
+    const auto velocity = caller->velocity("world", "arm", {std::nullopt, 1ns});
+    CHECK(outcome(velocity) == "invalid_input");
+    CHECK_THAT(velocity.error().message,
+               ContainsSubstring("'arm'") && ContainsSubstring("without a stamp"));
+    CHECK(outcome(caller->lookup("world", "arm", beyond)) == "not_yet");
+  }
+  CHECK(outcome(watch.lookup(beyond)) == "not_yet");
 }
 
 TEST_CASE("velocity: unspecified edges are named") {

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "support/catch.hpp"
 #include "support/thesis.hpp"
 
@@ -51,6 +53,46 @@ TEST_CASE("daemon: two daemons own the parts of one robot") {
   CHECK_THAT(result.out, ContainsSubstring("0.100000  0.983325  1.183325"));
 }
 
+TEST_CASE("daemon: it says how many edges have no covariance, and what to write") {
+  const TestDomain domain;
+  const std::vector<std::string> arguments = {"--partition", "arm", "--urdf", kArm, "--no-state"};
+  const auto covariance_of_mount = [&] {
+    const CliResult result = domain.cli({"--json", "lookup", "base_link", "tool0"});
+    const auto answer = nlohmann::json::parse(result.out);
+    CHECK(answer.at("covariance").is_null());
+    CHECK(answer.at("assumed_joints").size() == 6);
+    return answer.at("basis").at("unspecified");
+  };
+  {
+    testing::Process daemon = domain.start_daemon(arguments);
+    (void)testing::await_ready(daemon);
+    CHECK_THAT(daemon.err(), ContainsSubstring("7 of 7 edges without covariance") &&
+                                 ContainsSubstring("--covariance exact") &&
+                                 ContainsSubstring("6 joints have none until"));
+    CHECK(covariance_of_mount().back() == "tool0");
+  }
+  {
+    std::vector<std::string> exact = arguments;
+    exact.insert(exact.end(), {"--covariance", "exact"});
+    testing::Process daemon = domain.start_daemon(exact);
+    (void)testing::await_ready(daemon);
+    CHECK_THAT(daemon.err(), ContainsSubstring("6 of 7 edges without covariance") &&
+                                 !ContainsSubstring("--covariance exact"));
+    // The flange is fixed, so only the six links that joints move are left.
+    CHECK(covariance_of_mount().size() == 6);
+    CHECK_THAT(domain.cli({"lookup", "base_link", "tool0"}).out,
+               ContainsSubstring("assumed      6 joints have had no sample: elbow_joint, "));
+    for (const char* joint :
+         {"shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"}) {
+      const std::string name = joint + std::string("_joint");
+      REQUIRE(domain.cli({"joint", name, "0.1", "--stddev", "0.001"}).status == 0);
+    }
+    const CliResult moved = domain.cli({"--json", "lookup", "base_link", "tool0"});
+    CHECK(nlohmann::json::parse(moved.out).at("covariance").is_array());
+    CHECK(nlohmann::json::parse(moved.out).at("assumed_joints").empty());
+  }
+}
+
 TEST_CASE("daemon: wrong URDF options and URDFs that cannot be served exit with 2") {
   const TestDomain domain;
   const auto refused = [&](std::vector<std::string> arguments, const std::string& why) {
@@ -64,6 +106,8 @@ TEST_CASE("daemon: wrong URDF options and URDFs that cannot be served exit with 
   refused({"--root", "world"}, "--root: comes before any --urdf");
   refused({"--strict-limits", "--urdf", kArm}, "--strict-limits: comes before any --urdf");
   refused({"--urdf", kArm, "--prefix", "a", "--prefix", "b"}, "--prefix: is given twice");
+  refused({"--covariance", "exact"}, "--covariance: needs --urdf");
+  refused({"--urdf", kArm, "--covariance", "large"}, "--covariance");
   refused({"--urdf", "/nowhere.urdf"}, "/nowhere.urdf: cannot be opened");
   refused({"--urdf", kArm, "--links", "x"}, kArm + ": links 'x': link 'x' does not exist");
   refused({"--urdf", kArm, "--urdf", kArm}, "frame 'base_link': id is taken by the frame in");

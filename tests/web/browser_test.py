@@ -95,9 +95,22 @@ class Browser(unittest.TestCase):
 
         rig.eventually(clicked, "a row of the list")
         self.assertEqual(browser.execute_script("return tfdude.inspector.a.value"), "world")
-        answer = self.answer(browser)
+        self.answer(browser)
+        joints = robot.ask("lookup", "world", "tool0")["assumed_joints"]
+        self.assertEqual(len(joints), 6)
+        text = "return document.getElementById('inspector').innerText"
+        note = f"6 joints have had no sample: {', '.join(joints)}."
+        rig.eventually(lambda: note in browser.execute_script(text), "the joints that are assumed")
+        robot.ask("joint", *[f"{joint}=0.3" for joint in joints], "--stddev", "0.01")
+        answer = self.answer(browser, " && a.covariance")
+        rig.eventually(lambda: "no sample" not in browser.execute_script(text), "positions that are measured")
         said = robot.ask("lookup", "world", "tool0")
         self.assert_same_pose(self.number(answer), self.number(said), 1e-12)
+        # Deviations are in the axes of the numbers beside them: those of the origin of B are what `point` prints.
+        origin = robot.ask("point", "world", "tool0", "0", "0", "0")["points"][0]["covariance"]
+        sigmas = browser.execute_script("return tfdude.inspector.sigmas(tfdude.inspector.answer)")
+        self.assert_close(sigmas[:3], [origin[i][i] ** 0.5 for i in range(3)], 1e-9)
+        self.assert_close(sigmas[3:], [said["covariance"][i][i] ** 0.5 for i in range(3, 6)], 1e-9)
         key = "covariance" if said.get("covariance") else "covariance_of_specified"
         for row, other in zip(answer[key], said[key]):
             self.assert_close(row, other, 1e-12)

@@ -36,7 +36,10 @@ const connection = new Connection({
       structure: () => takeStructure(message),
       pair: () => takePair(message),
       status: () => takeStatus(message),
-      joints: () => drawJoints(model.joints = message.joints),
+      joints: () => {
+        drawJoints(model.joints = message.joints);
+        inspector.dirty = true;  // it names joints that have had no sample
+      },
       events: () => { model.events.push(...message.events); drawEvents(model.events = model.events.slice(-300)); },
     }[message.op];
     if (take) take();

@@ -1,7 +1,7 @@
 // B in A: the numbers that the server has got from the owners, exactly as `tfdude lookup` prints them.
 import { UNSPECIFIED } from './model.js';
 import { Plot } from './plot.js';
-import { eigen, rotation, toRpy } from './spatial.js';
+import { eigen, positionCovariance, toRpy } from './spatial.js';
 import { clock, degrees, element, fixed, metres, seconds } from './text.js';
 
 const NAMES = ['x', 'y', 'z', 'roll', 'pitch', 'yaw'];
@@ -65,9 +65,19 @@ export class Inspector {
     this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
   }
 
+  /** Beside the numbers: of the position along the axes of A, then of the rotation about the axes of B. */
   sigmas(answer) {
     const rows = answer.covariance || answer.covariance_of_specified;
-    return rows ? rows.map((row, i) => Math.sqrt(Math.max(0, row[i]))) : null;
+    if (!rows) return null;
+    const S = positionCovariance(answer.rotation, rows);
+    return rows.map((row, i) => Math.sqrt(Math.max(0, i < 3 ? S[4 * i] : row[i])));
+  }
+
+  /** The joints that move unspecified edges and have had no sample, by the names that samples have. */
+  assumed(answer) {
+    const moved = new Set(answer.basis.unspecified);
+    const joints = this.model.joints.filter((joint) => !joint.measured && moved.has(joint.frame));
+    return [...new Set(joints.map((joint) => (joint.mimic ? joint.mimic.joint : joint.name)))].sort();
   }
 
   draw() {
@@ -111,7 +121,11 @@ export class Inspector {
     if (!complete) {
       const edges = basis.unspecified.join(', ');
       notes.push(note(`σ is not given for ${edges}: these numbers are of the other edges only.`, 'warn'));
+      const joints = this.assumed(answer);
+      const have = joints.length === 1 ? 'joint has' : 'joints have';
+      if (joints.length) notes.push(note(`${joints.length} ${have} had no sample: ${joints.join(', ')}.`, 'warn'));
     }
+    if (s) notes.push(note('σ of x, y, z is along the axes of A, of the rotation about the axes of B.', ''));
     if (basis.bound) notes.push(note('σ is an upper bound: some correlations are not known.', ''));
     const copy = element('button', { class: 'copy', title: 'Copy as JSON',
       onclick: () => navigator.clipboard.writeText(JSON.stringify(answer)) }, 'copy');
@@ -132,16 +146,7 @@ export class Inspector {
     if (!rows || rows.slice(0, 3).every((row, i) => row[i] === 0)) {
       return answer.covariance ? [element('p', { class: 'note' }, 'Declared as exact: σ is zero.')] : [];
     }
-    const R = new Float64Array(9), S = new Float64Array(9);
-    rotation(R, [...answer.rotation, 0, 0, 0], 0);
-    for (let i = 0; i < 3; ++i) {
-      for (let j = 0; j < 3; ++j) {
-        let sum = 0;
-        for (let m = 0; m < 3; ++m) for (let n = 0; n < 3; ++n) sum += R[3 * i + m] * rows[m][n] * R[3 * j + n];
-        S[3 * i + j] = sum;
-      }
-    }
-    const { values, vectors } = eigen(S);
+    const { values, vectors } = eigen(positionCovariance(answer.rotation, rows));
     const most = Math.sqrt(values[0]) || 1;
     const title = answer.covariance ? `${this.k} σ contains ${SHARES[this.k]}` : `${this.k} σ of the other edges`;
     return [element('h2', {}, `Ellipsoid · ${title}`),

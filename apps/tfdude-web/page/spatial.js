@@ -68,6 +68,23 @@ export function transport(out, o, X, a, S, s) {
   }
 }
 
+/**
+ * The covariance of B's position along the axes of A, 3x3 row by row: R S Rᵀ, of the rotation q of X_AB and the rows of
+ * its covariance, which has the axes of B.
+ */
+export function positionCovariance(q, rows) {
+  const R = new Float64Array(9), S = new Float64Array(9);
+  rotation(R, [...q, 0, 0, 0], 0);
+  for (let i = 0; i < 3; ++i) {
+    for (let j = 0; j < 3; ++j) {
+      let sum = 0;
+      for (let m = 0; m < 3; ++m) for (let n = 0; n < 3; ++n) sum += R[3 * i + m] * rows[m][n] * R[3 * j + n];
+      S[3 * i + j] = sum;
+    }
+  }
+  return S;
+}
+
 /** Eigenvalues, descending, and unit eigenvectors (columns of V) of a symmetric 3x3 matrix, by Jacobi's method. */
 export function eigen(M) {
   const A = M.slice(), V = [1, 0, 0, 0, 1, 0, 0, 0, 1];

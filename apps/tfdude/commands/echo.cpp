@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "tfdude/math/perturbation.hpp"
 #include "tfdude/recording/recording.hpp"
 
 #include "../../rendering/format.hpp"
@@ -14,25 +15,27 @@
 namespace tfdude::cli {
 
 std::string echo_lines(const std::string& a, const std::string& b, const StampedTransform& X_AB,
-                       std::optional<Time> now, const AngleUnit& angles) {
+                       std::optional<Time> now, const AngleUnit& angles,
+                       const std::vector<std::string>& assumed) {
   const Eigen::Vector3d t = X_AB.pose.translation();
   const Eigen::Vector3d rpy = to_rpy(X_AB.pose.rotation()) * angles.per_radian;
-  const auto s = X_AB.covariance.of_specified().stddev();
+  const auto s = stddev_in_parent(X_AB);
   std::string text = shortened(b, room(34, 34)) + " seen from " + shortened(a, room(34, 34)) + "\n";
   text += format("position  %12.6f %12.6f %12.6f m\n", t.x(), t.y(), t.z());
   const auto row = [&](double x, double y, double z) {
-    return format("%12.*f %12.*f %12.*f %s\n", angles.decimals, x, angles.decimals, y,
+    return format("%12.*f %12.*f %12.*f %s", angles.decimals, x, angles.decimals, y,
                   angles.decimals, z, angles.name);
   };
-  text += "rpy       " + row(rpy.x(), rpy.y(), rpy.z());
+  text += "rpy       " + row(rpy.x(), rpy.y(), rpy.z()) + "\n";
   const bool complete = X_AB.covariance.complete();
   if (!complete) {
     text += "std dev   " + shortened(unspecified_text(X_AB.basis.unspecified), room(70)) + "\n";
   }
+  if (!assumed.empty()) text += "assumed   " + shortened(assumed_text(assumed), room(70)) + "\n";
   text += (complete ? "std dev   " : "of others ") +
-          format("%12.6f %12.6f %12.6f m\n", s[0], s[1], s[2]);
+          format("%12.6f %12.6f %12.6f m   %s\n", s[0], s[1], s[2], kAxesOfTranslation);
   const double unit = angles.per_radian;
-  text += "          " + row(s[3] * unit, s[4] * unit, s[5] * unit);
+  text += "          " + row(s[3] * unit, s[4] * unit, s[5] * unit) + " " + kAxesOfRotation + "\n";
   return text + "age       " + (X_AB.stamp ? ago(*X_AB.stamp, now) : "none (static)") + "\n";
 }
 
@@ -80,7 +83,8 @@ struct Echo final : RecordableCommand {
     if (common.json) {
       (void)path.print(source, common, X_AB);
     } else {
-      screen.redraw(echo_lines(path.a, path.b, X_AB, now(), common.angles));
+      const auto joints = assumed_joints(source, path.a, path.b, X_AB.basis.unspecified);
+      screen.redraw(echo_lines(path.a, path.b, X_AB, now(), common.angles, joints));
     }
   }
 

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tfdude/client/client.hpp"
 
@@ -13,6 +14,7 @@ namespace tfdude::cli {
 /// @param now  absent: the age is not known
 [[nodiscard]] std::string echo_lines(const std::string& a, const std::string& b,
                                      const StampedTransform& X_AB, std::optional<Time> now,
-                                     const AngleUnit& angles);
+                                     const AngleUnit& angles,
+                                     const std::vector<std::string>& assumed = {});
 
 }  // namespace tfdude::cli

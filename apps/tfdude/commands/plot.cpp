@@ -88,7 +88,11 @@ struct PlotCommand final : Question {
     if (!plot) return report_cause(source, plot.error(), common);
     plot->samples = samples;
     plot->angles = common.angles;
-    nlohmann::json json{{"from", path.a}, {"to", path.b}, {"frames", plot->frames}};
+    plot->assumed = assumed_joints(source, path.a, path.b, X_AB->basis.unspecified);
+    nlohmann::json json{{"from", path.a},
+                        {"to", path.b},
+                        {"frames", plot->frames},
+                        {"assumed_joints", plot->assumed}};
     if (samples > 0) {
       json["samples"] = samples;
       json["seed"] = kSampleSeed;

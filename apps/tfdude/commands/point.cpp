@@ -60,6 +60,8 @@ struct PointCommand final : Question {
     }
     add_stamp(json, X_AB->stamp);
     json["basis"] = basis_json(X_AB->basis);
+    const auto assumed = assumed_joints(source, path.a, path.b, X_AB->basis.unspecified);
+    json["assumed_joints"] = assumed;
     if (joint) {
       const Eigen::MatrixXd together = joint_covariance(*X_AB, *p_B, query.order);
       const bool complete = X_AB->covariance.complete();
@@ -67,6 +69,7 @@ struct PointCommand final : Question {
       text += std::string("covariance   of all points") + (complete ? "" : ", of the others") +
               (direction ? "\n" : " [m²]\n") + rows_text(together);
     }
+    text += assumed_line(assumed);
     text += stamp_line(source, common, path.a, path.b, X_AB->stamp);
     return answer(common, json, text + describe(X_AB->basis));
   }

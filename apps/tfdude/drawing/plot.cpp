@@ -152,20 +152,24 @@ void draw_header(Svg& svg, const Scene& scene) {
   svg.text({kLeft, 34},
            shown + " in " + elide(from, 20, 2 * each - std::min(2 * each, text_width(shown, 20))),
            "title");
-  const Vector3d stddev = scene.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-  const Unit unit = text_unit_for(std::max(scene.mean.cwiseAbs().maxCoeff(), stddev.maxCoeff()));
+  const auto s = stddev_in_parent(plot.X_AB);
+  const double largest = *std::max_element(s.begin(), s.begin() + 3);
+  const Unit unit = text_unit_for(std::max(scene.mean.cwiseAbs().maxCoeff(), largest));
   const bool least = !plot.X_AB.covariance.complete();
   for (int axis = 0; axis < 3; ++axis) {
     svg.text({kLeft + axis * (kPanel + kGap), 60},
-             kAxes[axis] + (" = " + position_text(scene.mean[axis], stddev[axis], unit, least)),
+             kAxes[axis] + (" = " + position_text(scene.mean[axis],
+                                                  s[static_cast<std::size_t>(axis)], unit, least)),
              "value");
   }
-  const auto s = plot.X_AB.covariance.of_specified().stddev();
   svg.text({kLeft, 80},
            std::string("rotation ± ") + (least ? "more than " : "") +
                angle_text(s[3], 3, plot.angles) + ", " + angle_text(s[4], 3, plot.angles) + ", " +
                angle_text(s[5], 3, plot.angles) + " about the axes of " +
-               elide(to, kLabelSize, 300) + "; ± is one standard deviation",
+               elide(to, kLabelSize, 130) +
+               "; ± is one standard deviation, of x, y and z along the "
+               "axes of " +
+               elide(from, kLabelSize, 130),
            "");
 }
 
@@ -309,18 +313,21 @@ void draw_row(Svg& svg, const Scene& scene, bool zoomed, double top) {
   }
 }
 
-// A note on edges that are left out, or else that the points ignore correlation, if that makes a
+// Notes on edges that are left out, or else that the points ignore correlation, if that makes a
 // difference.
-std::string note_of(const Plot& plot) {
+std::vector<std::string> notes_of(const Plot& plot) {
   const Basis& basis = plot.X_AB.basis;
+  std::vector<std::string> notes;
   if (!plot.X_AB.covariance.complete()) {
-    return elide(
-        "± and ellipses are those of the other edges: " + unspecified_text(basis.unspecified),
-        kLabelSize, kWidth - kLeft - kRight);
+    notes.push_back("± and ellipses are those of the other edges: " +
+                    unspecified_text(basis.unspecified));
+    if (!plot.assumed.empty()) notes.push_back(assumed_text(plot.assumed));
+  } else if (plot.samples > 0 && (basis.bound || !basis.sources.empty())) {
+    notes.push_back(
+        std::string("The points take edges as independent; the ellipses do not, since ") +
+        (basis.bound ? "the correlation of some is unknown." : "some share sources."));
   }
-  if (plot.samples == 0 || (!basis.bound && basis.sources.empty())) return "";
-  return std::string("The points take edges as independent; the ellipses do not, since ") +
-         (basis.bound ? "the correlation of some is unknown." : "some share sources.");
+  return notes;
 }
 
 }  // namespace
@@ -328,16 +335,19 @@ std::string note_of(const Plot& plot) {
 std::string draw_plot(const Plot& plot) {
   const Scene scene = scene_of(plot);
   const bool zoomed = scene.spread > 0;
-  const std::string note = note_of(plot);
+  const std::vector<std::string> notes = notes_of(plot);
   const double legend = kHeader + (zoomed ? 2 : 1) * kRow + 14;
-  const double height = legend + kFooter - 14 + (note.empty() ? 0 : kLine);
+  const double height = legend + kFooter - 14 + kLine * static_cast<double>(notes.size());
   Svg svg(kWidth, height, plot.frames.back() + " in " + plot.frames.front(), kStyle);
   svg.rect({0, 0, kWidth, height}, "page");
   draw_header(svg, scene);
   draw_row(svg, scene, false, kHeader);
   if (zoomed) draw_row(svg, scene, true, kHeader + kRow);
   draw_legend(svg, scene, legend);
-  if (!note.empty()) svg.text({kLeft, legend + kLine}, note, "");
+  double line = legend;
+  for (const std::string& note : notes) {
+    svg.text({kLeft, line += kLine}, elide(note, kLabelSize, kWidth - kLeft - kRight), "");
+  }
   return svg.finish();
 }
 

@@ -14,9 +14,10 @@ namespace tfdude::cli {
 
 struct Plot {
   StampedTransform X_AB;
-  std::vector<std::string> frames;  ///< of the path, from A to B
-  std::vector<Step> steps;          ///< between them
-  int samples = 0;                  ///< number of points to sample and draw
+  std::vector<std::string> frames;   ///< of the path, from A to B
+  std::vector<Step> steps;           ///< between them
+  std::vector<std::string> assumed;  ///< joints of the path that have had no sample
+  int samples = 0;                   ///< number of points to sample and draw
   AngleUnit angles = kRadian;
 };
 

@@ -16,7 +16,8 @@ struct UrdfJoint {
   /// Before the first sample [rad or m]; absent: rest_position(). Not for a joint that mimics
   /// another.
   std::optional<double> position{};
-  /// Of the position [rad or m]; absent: the root of unmeasured_variance().
+  /// Of the position [rad or m]; absent: unspecified until the first sample, as nobody has measured
+  /// it.
   std::optional<double> stddev{};
   /// Of the joint's origin. Absent: exact for a joint that moves, as its error is that of its
   /// position; UrdfPart::fixed for one that does not.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "tfdude/base/export.hpp"
 #include "tfdude/math/transform.hpp"
 
@@ -27,6 +29,11 @@ namespace tfdude {
 /// The inverse of ros_covariance().
 [[nodiscard]] TFDUDE_EXPORT Transform from_ros_covariance(const Pose& X,
                                                           const StatedCovariance& ros);
+
+/// The standard deviations that stand beside the numbers of X_AB: of B's origin along the axes of
+/// A, as its coordinates [m], then of the rotation about the axes of B [rad]. Of the specified
+/// edges, if the covariance is not complete. First order, as ros_covariance().
+[[nodiscard]] TFDUDE_EXPORT std::array<double, 6> stddev_in_parent(const Transform& X_AB);
 
 /// Jr(ξ), with Exp(ξ + δ) = Exp(ξ) · Exp(Jr(ξ) δ) for small δ; for any angle. Uses its power
 /// series, Solà et al., arXiv:1812.01537, Eqs. 67 and 179. Jl(ξ) = Jr(-ξ).

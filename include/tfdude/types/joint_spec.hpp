@@ -120,11 +120,4 @@ struct JointValue {
 /// The position assumed before the first sample: the one nearest to zero within the limits.
 [[nodiscard]] TFDUDE_EXPORT double rest_position(const std::optional<JointLimits>& limits);
 
-/// The variance to assume for an unknown position: its mean squared deviation from `position`, if
-/// all positions within the limits are equally likely. A revolute joint without limits is uniform
-/// over one turn.
-/// @return nothing for a prismatic joint without limits, for which nothing is known
-[[nodiscard]] TFDUDE_EXPORT std::optional<double> unmeasured_variance(
-    JointType type, const std::optional<JointLimits>& limits, double position);
-
 }  // namespace tfdude

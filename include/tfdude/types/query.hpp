@@ -16,7 +16,8 @@ struct Query {
   /// Absent: the newest instant for which all dynamic edges of the path have data.
   std::optional<Time> at;
   /// How far beyond an edge's newest sample it may be extrapolated, with the motion of its last two
-  /// samples.
+  /// samples: at most by 100 times the time between them, and not if one of them came without a
+  /// stamp.
   std::chrono::nanoseconds extrapolate{0};
   /// Adds the process noise of the dynamic edges, from the instant of the answer until this one, to
   /// the covariance of the answer.

@@ -138,13 +138,25 @@ struct OrderNumber : Octet {
   }
 };
 
+// What is asked of each segment.
+struct OfEdges : Octet {
+  static void write(const LookupRequest& lookup, std::uint8_t& wire) {
+    wire = lookup.timed ? 2 : lookup.edges ? 1 : 0;
+  }
+  static Result<void> read(std::uint8_t wire, LookupRequest& lookup, const Place&) {
+    lookup.edges = wire != 0;
+    lookup.timed = wire == 2;
+    return {};
+  }
+};
+
 constexpr auto kLookupAt = record(
     TFDUDE_FIELD(at, query.at, Stamp("the instant of a lookup")),
     TFDUDE_FIELD(hint, hint, Stamp("the hint of a lookup")),
     TFDUDE_FIELD(extrapolate, query.extrapolate, Duration("an extrapolation")),
     TFDUDE_FIELD(age_noise_until, query.age_noise_until, Stamp("the end of a lookup's noise")),
     TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(order, query.order, OrderNumber()),
-    TFDUDE_FIELD(edges, edges, Octet()));
+    TFDUDE_FIELD_OF_ALL(edges, OfEdges()));
 
 constexpr auto kWatch = Ruled(
     record(TFDUDE_FIELD(period, period, Duration("the period of a watch")),

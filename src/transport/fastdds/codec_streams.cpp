@@ -50,12 +50,18 @@ constexpr auto kJoints =
 // What is pushed instead of the stamp of a value if the history was cleared.
 constexpr std::int64_t kClearedStamp = -2;
 
+// A stamp that was made up is pushed as this minus the stamp.
+constexpr std::int64_t kMadeUp = -3;
+
 struct PushedStamp : Number<std::int64_t> {
   static void write(const PushedValue& entry, std::int64_t& wire) {
     wire = entry.cleared ? kClearedStamp : wire_stamp(entry.stamp);
+    if (entry.made_up && wire >= 0 && wire <= INT64_MAX + kMadeUp) wire = kMadeUp - wire;
   }
   static Result<void> read(std::int64_t wire, PushedValue& entry, const Place& place) {
     entry.cleared = wire == kClearedStamp;
+    entry.made_up = wire <= kMadeUp;
+    if (entry.made_up) wire = -(wire - kMadeUp);
     return Stamp("the stamp of a pushed value")
         .read(entry.cleared ? kNoStamp : wire, entry.stamp, place);
   }

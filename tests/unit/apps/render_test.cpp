@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/commands/echo.hpp"
 #include "tfdude/commands/tree.hpp"
 #include "tfdude/commands/velocity.hpp"
 
@@ -72,7 +73,33 @@ TEST_CASE("a transform is printed in metres and radians unless degrees are asked
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          0.174533  -0.349066  1.570796  rad",
-            "std dev      0.010000  0.020000  0.030000  m   0.017453  0.034907  0.052360  rad"});
+            "std dev      0.020373  0.013850  0.028162  m    along the axes of A",
+            "             0.017453  0.034907  0.052360  rad  about the axes of B"});
+}
+
+TEST_CASE("deviations stand beside the coordinates that they are of") {
+  // Turned by 90 degrees about z: B's x is A's y.
+  const Transform X{*Pose::create({std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 2, 0}),
+                    *Covariance::from_stddev({0.001, 0.1, 0.002, 0.01, 0.02, 0})};
+  CHECK_THAT(
+      describe(X, {kRadian, true, false}),
+      ContainsSubstring("std dev      0.100000  0.001000  0.002000  m    along the axes of A\n"
+                        "             0.010000  0.020000  0.000000  rad  about the axes of B\n"
+                        "covariance   ") &&
+          ContainsSubstring("in the axes of B"));
+  CHECK_THAT(
+      echo_lines("map", "hand", {X, {}, {}}, {}, kRadian),
+      ContainsSubstring("    0.100000     0.001000     0.002000 m   along the axes of A\n") &&
+          ContainsSubstring("    0.010000     0.020000     0.000000 rad about the axes of B\n"));
+  const json answer = lookup_json("map", "hand", X, {});
+  CHECK(answer["covariance_axes"] == "hand");
+  CHECK(answer["covariance"][1][1].get<double>() == Approx(0.01));
+}
+
+TEST_CASE("joints that have had no sample are named") {
+  CHECK(assumed_line({}).empty());
+  CHECK(assumed_line({"pan"}) == "assumed      1 joint has had no sample: pan\n");
+  CHECK(assumed_line({"lift", "pan"}) == "assumed      2 joints have had no sample: lift, pan\n");
 }
 
 TEST_CASE("the covariance of angles has the unit of the angles") {
@@ -90,7 +117,7 @@ TEST_CASE("the covariance of angles has the unit of the angles") {
 TEST_CASE("a pose is printed as a matrix if asked for") {
   const Transform X = example();
   const auto lines = lines_of(describe(X, {kRadian, false, true}));
-  REQUIRE(lines.size() == 5);
+  REQUIRE(lines.size() == 6);
   const Eigen::Matrix4d matrix = X.pose.matrix();
   for (int row = 0; row < 4; ++row) {
     std::istringstream in(lines[static_cast<std::size_t>(row)].substr(row == 0 ? 6 : 0));
@@ -127,7 +154,8 @@ TEST_CASE("a transform is printed in degrees") {
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          10.0000  -20.0000  90.0000  deg",
-            "std dev      0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
+            "std dev      0.020373  0.013850  0.028162  m    along the axes of A",
+            "             1.0000  2.0000  3.0000  deg  about the axes of B"});
 }
 
 TEST_CASE("a covariance is printed as a matrix if asked for") {
@@ -136,10 +164,10 @@ TEST_CASE("a covariance is printed as a matrix if asked for") {
   upper[upper_index(0, 1)] = -1e-5;
   X.covariance = *Covariance::from_upper(upper);
   const auto lines = lines_of(describe(X, {kRadian, true, false}));
-  REQUIRE(lines.size() == 12);
-  CHECK(lines[4].find("translation first") != std::string::npos);
+  REQUIRE(lines.size() == 13);
+  CHECK(lines[5].find("translation first") != std::string::npos);
   for (std::size_t row = 0; row < 6; ++row) {
-    std::istringstream in(lines[6 + row]);
+    std::istringstream in(lines[7 + row]);
     for (int column = 0; column < 6; ++column) {
       double value = -1;
       REQUIRE(in >> value);
@@ -147,7 +175,7 @@ TEST_CASE("a covariance is printed as a matrix if asked for") {
       CHECK(std::abs(value - expected) <= 1e-5 * std::abs(expected));
     }
   }
-  CHECK(lines[6].find("-1.00000e-05") != std::string::npos);
+  CHECK(lines[7].find("-1.00000e-05") != std::string::npos);
 }
 
 TEST_CASE("a covariance that is not complete is printed as that of the other edges") {
@@ -159,7 +187,8 @@ TEST_CASE("a covariance that is not complete is printed as that of the other edg
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          10.0000  -20.0000  90.0000  deg",
             "std dev      unspecified for odom, a\\x0ab",
-            "  of others  0.010000  0.020000  0.030000  m   1.0000  2.0000  3.0000  deg"});
+            "  of others  0.020373  0.013850  0.028162  m    along the axes of A",
+            "             1.0000  2.0000  3.0000  deg  about the axes of B"});
   const std::string text = describe(X, in_degrees(true), {"odom"});
   CHECK(text.find("covariance   of the others") != std::string::npos);
 }

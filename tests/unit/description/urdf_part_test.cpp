@@ -36,6 +36,7 @@ const FrameSpec& named(const std::vector<FrameSpec>& frames, const std::string& 
 
 TEST_CASE("urdf: a chain of mimic joints is resolved to its first joint") {
   UrdfPart part = with_joint("f1", {0.25, 0.1, {}});
+  part.joints["f4"].stddev = 0.1;
   part.prefix = "p_";
   const auto frames = frames_of(hand(), part);
   const auto& first = *named(frames, "p_l1").joint;

@@ -225,13 +225,13 @@ TEST_CASE("urdf: a limit that no position can reach is ignored") {
   const auto rotor = joint("-1e16", "1e16");
   CHECK_FALSE(rotor.limits.has_value());
   CHECK(rotor.position == 0);
-  CHECK(*rotor.variance == Approx(M_PI * M_PI / 3));
+  CHECK_FALSE(rotor.variance);
   const auto half = joint("0.5", "1e16");
   REQUIRE(half.limits.has_value());
   CHECK(half.limits->lower == 0.5);
   CHECK(half.limits->contain(1e9));
   CHECK(half.position == 0.5);
-  CHECK(*half.variance == Approx(M_PI * M_PI / 3));
+  CHECK_FALSE(half.variance);
 }
 
 TEST_CASE("urdf: an infinite limit is none") {
@@ -246,7 +246,7 @@ TEST_CASE("urdf: an infinite limit is none") {
     CHECK(joint(limits("0.5", word)).limits->lower == 0.5);
     CHECK(joint(limits("0.5", word)).limits->contain(1e9));
   }
-  CHECK(joint(limits("-inf", "+inf")).variance.has_value() == (type == "revolute"));
+  CHECK_FALSE(joint(limits("-inf", "+inf")).variance);
   CHECK(joint(limits("-inf", "2")).limits->upper == 2);
   CHECK(joint(limits("-inf", "2")).limits->contain(-1e9));
   const std::string place = "r.urdf:4: joint 'j': ";
@@ -277,7 +277,8 @@ TEST_CASE("urdf: a joint has its given or default position before its first samp
     return *frames_of(pair("revolute", limits("1", "3")), part)[1].joint;
   };
   CHECK(at({"r.urdf"}).position == 1);
-  CHECK(*at({"r.urdf"}).variance == Approx(4.0 / 12 + 1));
+  // Nobody has measured it, so nothing is claimed of its error.
+  CHECK_FALSE(at({"r.urdf"}).variance);
   CHECK_FALSE(at({"r.urdf"}).strict);
   const auto said = at(with_joint("j", {2.5, 0.1, {}}));
   CHECK(said.position == 2.5);
@@ -298,6 +299,20 @@ TEST_CASE("urdf: a joint has its given or default position before its first samp
   CHECK(frames_of(pair("fixed"), with_joint("j", with_origin))[1]
             .X_PC.covariance.of_specified()
             .stddev()[5] == Approx(6));
+}
+
+TEST_CASE(
+    "urdf: an edge is unspecified until its joint has a sample, unless the position has a stddev") {
+  const std::string type = GENERATE("revolute", "continuous", "prismatic");
+  CAPTURE(type);
+  const std::string one = pair(type, type == "continuous" ? "" : limits("1", "3"));
+  UrdfPart exact{"r.urdf"};
+  exact.fixed = tfdude::StatedCovariance::exact();
+  CHECK_FALSE(frames_of(one, exact)[1].X_PC.covariance.complete());
+  CHECK(frames_of(one, with_joint("j", {1.0, 0.1, {}}))[1].X_PC.covariance.complete());
+  // So are those that mimic it.
+  const auto fingers = frames_of(hand());
+  for (std::size_t i = 1; i < 5; ++i) CHECK_FALSE(fingers[i].X_PC.covariance.complete());
 }
 
 TEST_CASE("urdf: files that cannot be read are rejected") {

@@ -1,5 +1,6 @@
 #include "tfdude/math/perturbation.hpp"
 
+#include <cmath>
 #include <functional>
 
 #include "support/catch.hpp"
@@ -99,6 +100,25 @@ TEST_CASE("ROS's covariance of a camera that looks along x is along the parent's
   CHECK(ros[1] == testing::Approx(0.1));
   CHECK(ros[3] == testing::Approx(0).margin(1e-12));
   CHECK(ros[4] == testing::Approx(0.01));
+}
+
+TEST_CASE("Deviations beside coordinates are those of sampled coordinates") {
+  Random random(604);
+  INFO("seed " << random.seed());
+  const Transform X{random.pose(), random.covariance(0.01, 0.004)};
+  const Covariance given = *X.covariance.if_complete();
+  const Gaussian gaussian(given);
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (int i = 0; i < kSamples; ++i) {
+    const Pose drawn = X.pose * exp(gaussian(random));
+    squares += (drawn.translation() - X.pose.translation()).cwiseAbs2();
+  }
+  const auto s = stddev_in_parent(X);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double sampled = std::sqrt(squares[static_cast<Eigen::Index>(axis)] / kSamples);
+    CHECK(s[axis] == testing::Approx(sampled).epsilon(0.01));
+    CHECK(s[axis + 3] == given.stddev()[axis + 3]);
+  }
 }
 
 TEST_CASE("The right Jacobian is the derivative of the exponential") {

@@ -1,18 +1,14 @@
 #include "tfdude/types/joint_spec.hpp"
 
-#include <cmath>
 #include <string>
 
 #include "support/catch.hpp"
-#include "support/random.hpp"
 
 namespace {
 
 using tfdude::JointLimits;
 using tfdude::JointSpec;
 using tfdude::JointType;
-using tfdude::testing::Approx;
-using tfdude::testing::Random;
 
 }  // namespace
 
@@ -28,29 +24,6 @@ TEST_CASE("joints: the rest position is the one within the limits that is neares
   CHECK(tfdude::rest_position(JointLimits{1, 2}) == 1);
   CHECK(tfdude::rest_position(JointLimits{-3, -2}) == -2);
   CHECK(tfdude::rest_position(JointLimits{4, 4}) == 4);
-}
-
-TEST_CASE("joints: an unmeasured position has the variance of a uniform one within the limits") {
-  Random random(6);
-  INFO("seed " << random.seed());
-  constexpr int kSteps = 100000;
-  for (int run = 0; run < 20; ++run) {
-    const double lower = random.uniform(-3, 3);
-    const JointLimits limits{lower, lower + random.uniform(0, 3)};
-    const double at = random.uniform(limits.lower, limits.upper);
-    double sum = 0;
-    for (int i = 0; i < kSteps; ++i) {
-      const double share = (i + 0.5) / kSteps;
-      sum += std::pow(limits.lower + share * (limits.upper - limits.lower) - at, 2);
-    }
-    const auto variance = tfdude::unmeasured_variance(JointType::kRevolute, limits, at);
-    REQUIRE(variance);
-    REQUIRE(*variance == Approx(sum / kSteps).epsilon(1e-6).margin(1e-12));
-  }
-  const double turn = std::pow(std::acos(-1.0), 2) / 3;  // of -π to π
-  CHECK(*tfdude::unmeasured_variance(JointType::kContinuous, std::nullopt, 5) == Approx(turn));
-  CHECK_FALSE(tfdude::unmeasured_variance(JointType::kPrismatic, std::nullopt, 5));
-  CHECK(tfdude::unmeasured_variance(JointType::kPrismatic, JointLimits{2, 2}, 2) == 0);
 }
 
 TEST_CASE("joints: a coupled joint's own covariance is only that of its origin") {

@@ -135,7 +135,9 @@ std::vector<Request> random_requests(Random& random) {
                                    }),
                            random_stamp(random)});
   add(MoveRequest{named(), random_parts(random), random_count(random)});
-  add(LookupRequest{random_segments(random, 0), query, random_stamp(random), random.index(2) == 0});
+  const bool of_edges = random.index(2) == 0;
+  add(LookupRequest{random_segments(random, 0), query, random_stamp(random), of_edges,
+                    of_edges && random.index(2) == 0});
   add(WatchRequest{random_segments(random, 1), random.index(2) == 0,
                    std::chrono::nanoseconds(random.index(1000)), random_stamp(random)});
   add(HistoryRequest{random.index(2) == 0});
@@ -183,6 +185,7 @@ PushedValues random_pushed(Random& random) {
     if (random.index(3) == 0) entry.process_noise = random.covariance();
     entry.covariance_number = static_cast<std::uint32_t>(random.index(3));
     entry.covariance_known = entry.covariance_number != 0 && !entry.X.covariance.complete();
+    entry.made_up = entry.stamp && *entry.stamp < time_of(INT64_MAX - 2) && random.index(3) == 0;
     entry.cleared = !entry.stamp && random.index(3) == 0;
     entry.unsampled = !entry.stamp && !entry.cleared && random.index(2) == 0;
     if (entry.unsampled && !entry.process_noise) entry.process_noise = Covariance();

@@ -83,12 +83,16 @@ TEST_CASE("clock: while it stands still, unstamped updates are one sample, with 
   }
   CHECK(sim.forest.histories("arm").at(0).samples == 1);
   CHECK(sim.forest.histories("arm").at(0).newest == ms(7));
-  // A velocity is told by samples at two times.
+  // Nor do stamps at two times that the owner has made up tell a velocity.
   sim.now = ms(17);
   REQUIRE(sim.forest.update("arm", along_x(9)));
   REQUIRE(sim.forest.update("arm", along_x(3)));
   CHECK(x_of(sim.forest.lookup("world", "arm", at(12))) == testing::Approx(2.5));
-  CHECK(x_of(sim.forest.lookup("world", "arm", beyond)) == testing::Approx(7));
+  const auto made_up = sim.forest.lookup("world", "arm", beyond);
+  CHECK(outcome(made_up) == "not_yet");
+  CHECK_THAT(made_up.error().message, ContainsSubstring("edge of 'arm' has no data for 0.057 s") &&
+                                          ContainsSubstring("40.000 ms older") &&
+                                          ContainsSubstring("that of their arrival"));
   // A clock that was set back makes no stamp that is earlier, or told a velocity.
   sim.now = ms(3);
   REQUIRE(sim.forest.update({{"arm", along_x(4)}, {"mast", along_x(8)}}));
@@ -102,6 +106,54 @@ TEST_CASE("clock: while it stands still, unstamped updates are one sample, with 
   REQUIRE(sim.forest.update({{"arm", along_x(5)}, {"arm", along_x(6)}}));
   CHECK(x_of(sim.forest.lookup("world", "arm", Query{})) == 6);
   CHECK(outcome(sim.forest.update("arm", along_x(1), ms(17))) == "stamp_taken");
+}
+
+TEST_CASE("clock: samples tell a velocity again when two in a row have had stamps") {
+  Simulated sim;
+  sim.now = ms(100);
+  Forest watcher;
+  REQUIRE(watcher.add("world", "", {}));
+  REQUIRE(watcher.add("arm", "world", {}));
+  std::vector<EdgeCursor> cursors{{"arm", "world"}};
+  const std::vector<PathEnds> segments{{"world", "arm"}};
+  Query beyond = at(150);
+  beyond.extrapolate = 1s;
+  const auto beyond_of = [&](Forest& forest) {
+    return outcome(forest.lookup("world", "arm", beyond));
+  };
+  const auto follow = [&] {
+    watcher.take({*watcher.find("arm")}, sim.forest.values_since(cursors, {}).values);
+  };
+  const auto outcome_of_all = [&] {
+    follow();
+    CHECK(beyond_of(watcher) == beyond_of(sim.forest));
+    return beyond_of(sim.forest);
+  };
+  REQUIRE(sim.forest.update("arm", along_x(1), ms(80)));
+  follow();
+  REQUIRE(sim.forest.update("arm", along_x(2), ms(90)));
+  CHECK(outcome_of_all() == "ok");
+  CHECK(outcome(sim.forest.check_timed(segments, ms(80))) == "ok");
+  REQUIRE(sim.forest.update("arm", along_x(3)));
+  CHECK(outcome_of_all() == "not_yet");
+  CHECK(outcome(sim.forest.check_timed(segments, ms(85))) == "invalid_input");
+  REQUIRE(sim.forest.update("arm", along_x(4), ms(110)));
+  CHECK(outcome_of_all() == "not_yet");
+  // A late sample moves the place of the one without.
+  REQUIRE(sim.forest.update("arm", along_x(1.5), ms(85)));
+  CHECK(outcome_of_all() == "not_yet");
+  REQUIRE(sim.forest.update("arm", along_x(5), ms(120)));
+  CHECK(outcome_of_all() == "ok");
+  CHECK(x_of(watcher.lookup("world", "arm", beyond)) == testing::Approx(8));
+  CHECK(outcome(sim.forest.check_timed(segments, ms(105))) == "invalid_input");
+  CHECK(outcome(sim.forest.check_timed(segments, ms(110))) == "ok");
+  // Nor does the first of another history inherit it.
+  REQUIRE(sim.forest.update("arm", along_x(6)));
+  REQUIRE(sim.forest.clear_history("arm"));
+  REQUIRE(sim.forest.update("arm", along_x(7), ms(1)));
+  follow();
+  REQUIRE(sim.forest.update("arm", along_x(8), ms(101)));
+  CHECK(outcome_of_all() == "ok");
 }
 
 TEST_CASE("clock: a cleared edge is dynamic and has no value until its next sample") {

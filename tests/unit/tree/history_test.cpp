@@ -199,6 +199,28 @@ TEST_CASE("a lookup beyond the newest sample needs permission to extrapolate") {
   CHECK(says(message(alone), {"'tip'", "the only one"}));
 }
 
+TEST_CASE("an edge is extrapolated no further than its two newest samples carry") {
+  Arm arm;
+  REQUIRE(arm.forest.add("tip", "hand", {}));
+  // A millimetre within a nanosecond would be 50 km after 50 ms.
+  REQUIRE(arm.forest.update("tip", along_x(1), at(1990)));
+  REQUIRE(arm.forest.update("tip", along_x(1.001), Time(at(1990) + 1ns)));
+  const auto far = arm.forest.lookup("hand", "tip", extrapolating(2040, 1h));
+  CHECK(outcome(far) == "not_yet");
+  CHECK(says(message(far),
+             {"'tip'", "50.000 ms older", "too close together", "more than 100 ns", "1.990 s"}));
+  Query near = extrapolating(1990, 1h);
+  near.at = Time(at(1990) + 101ns);
+  CHECK(x_of(arm.forest.lookup("hand", "tip", near)) == Approx(1.101));
+  near.at = Time(at(1990) + 102ns);
+  CHECK(outcome(arm.forest.lookup("hand", "tip", near)) == "not_yet");
+  // A hundred intervals are carried, one more nanosecond is not.
+  REQUIRE(arm.forest.update("tip", along_x(2), at(2000)));
+  REQUIRE(arm.forest.update("tip", along_x(3), at(2010)));
+  CHECK(x_of(arm.forest.lookup("hand", "tip", extrapolating(3010, 1h))) == Approx(103));
+  CHECK(outcome(arm.forest.lookup("hand", "tip", extrapolating(3011, 1h))) == "not_yet");
+}
+
 TEST_CASE("process noise is added between samples and beyond them and with age if asked for") {
   Arm arm;
   EdgeTiming timing;

@@ -72,6 +72,7 @@ class Reference {
     if (outside && (t - all_.back().stamp > beyond || all_.size() < 2)) return std::nullopt;
     const Full& b = outside ? all_.back() : *after;
     const Full& a = *(outside ? all_.end() - 2 : after - 1);
+    if (outside && t - b.stamp > 100 * (b.stamp - a.stamp)) return std::nullopt;
     const double s = static_cast<double>(t - a.stamp) / static_cast<double>(b.stamp - a.stamp);
     const bool joint = a.state.joint != nullptr && a.state.joint == b.state.joint;
     if (joint) {
