@@ -63,8 +63,8 @@ class JointCovariance {
   [[nodiscard]] bool empty() const { return columns_.cols() == 0; }
 
   // Writes the same joint covariance with few columns, as common errors of new sources. All edges
-  // that share the sources are here. Columns with signs keep the most digits, so they are kept while
-  // there are few.
+  // that share the sources are here. Columns with signs keep the most digits, so they are kept
+  // while there are few.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Signed own = with_signs();
     const Eigen::Index count = own.less.cols() + own.more.cols();
