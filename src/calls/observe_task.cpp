@@ -139,7 +139,7 @@ Result<Task::Next> ObserveTask::first(Reply reply) {
   return Next::kAsk;
 }
 
-Result<Task::Next> ObserveTask::others(const std::vector<Reply>& replies) const {
+Result<Task::Next> ObserveTask::others(const std::vector<Reply>& replies) {
   std::size_t done = 1;
   std::optional<Error> refused;
   for (const Reply& reply : replies) {

@@ -52,7 +52,7 @@ class ObserveTask final : public Task {
   [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
   [[nodiscard]] Result<Next> apply(const ObservedPath& path, const Observation& found);
   [[nodiscard]] Result<Next> first(Reply reply);
-  [[nodiscard]] Result<Next> others(const std::vector<Reply>& replies) const;
+  [[nodiscard]] static Result<Next> others(const std::vector<Reply>& replies);
   [[nodiscard]] Result<Next> again();
 
   const Forest& forest_;

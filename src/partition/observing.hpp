@@ -17,7 +17,7 @@ namespace tfdude {
 struct ObservePlan {
   struct Edge {
     FrameInfo info;
-    ObservedEdge::Way way;
+    ObservedEdge::Way way{};
   };
   std::vector<Edge> edges;  ///< those of the path in order, then those beside it
   std::vector<Part> parts;  ///< a LookupRequest per owner, with its edges in that order
