@@ -87,7 +87,8 @@ class Pages : private CLI::Formatter {
     std::replace(page.begin(), page.end(), ' ', '-');
     const bool whole = &app == &program_;
     std::ofstream out(folder_ + "/" + page + ".1");
-    out << ".TH \"" << escaped(upper(page)) << "\" 1 \"\" \"" << version() << "\" \"tf\\-dude\"\n";
+    out << R"(.TH ")" << escaped(upper(page)) << R"(" 1 "" ")" << version() << R"(" "tf\-dude")"
+        << '\n';
     section(out, "NAME", page + " - " + description(app));
     out << ".SH SYNOPSIS\n.B " << escaped(called) << '\n' << escaped(usage(app)) << '\n';
     const Footer footer = footer_of(app);
@@ -125,13 +126,13 @@ class Pages : private CLI::Formatter {
   }
 
   // Without the name of the program, with which its description begins.
-  std::string description(const CLI::App& app) const {
+  [[nodiscard]] std::string description(const CLI::App& app) const {
     const std::string text = app.get_description();
     const std::string prefix = name_ + ": ";
     return text.rfind(prefix, 0) == 0 ? text.substr(prefix.size()) : text;
   }
 
-  std::string usage(const CLI::App& app) const {
+  [[nodiscard]] std::string usage(const CLI::App& app) const {
     std::string text = make_usage(&app, "");
     text.erase(0, text.find(' '));
     return CLI::detail::trim(text);

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Runs clang-tidy over src/ and apps/, those files first that were changed last: tidy.py [--minutes N] BUILD_DIR
+"""Runs clang-tidy over src/ and apps/, those files first that were changed last:
+
+    tidy.py [--changed] [--minutes N] BUILD_DIR
 
 BUILD_DIR is the folder of compile_commands.json. A clean file is not checked again until its preprocessed text, its
 compile command, the rules or the tool change: a full run takes many seconds per file, most of them in headers of other
-projects. With --minutes no file is begun after that time.
+projects. With --changed only those are checked that were changed since the last landed commit, or include such a
+header. With --minutes no file is begun after that time.
 """
 
 import argparse
@@ -79,8 +82,24 @@ def changes():
     return times
 
 
+def landed():
+    """The commit where HEAD has left origin/main; the one before HEAD, if that is HEAD; None: neither is known."""
+    def commit(*command):
+        return subprocess.run(["git", "-C", ROOT, *command], capture_output=True, text=True).stdout.strip()
+    here = commit("rev-parse", "HEAD")
+    base = commit("merge-base", "HEAD", "origin/main")
+    return base if base and base != here else commit("rev-parse", "--verify", "--quiet", "HEAD~1") or None
+
+
+def changed_since(commit, times):
+    """Of what changes() returns, what was changed since a commit."""
+    names = output_of("git", "-C", ROOT, "diff", "--name-only", commit).decode().splitlines()
+    names += output_of("git", "-C", ROOT, "ls-files", "--others", "--exclude-standard").decode().splitlines()
+    return {name: times[name] for name in names if name in times}
+
+
 def changed(file, times):
-    """When a source was last changed, or a header of the project that it includes itself."""
+    """When a source was last changed, or a header of the project that it includes itself; 0: that is not known."""
     newest = times.get(str(file.relative_to(ROOT)), 0)
     for name in re.findall(r'^#include "(.*)"', file.read_text(), re.MULTILINE):
         for folder in ("src", "include", "apps"):
@@ -90,6 +109,7 @@ def changed(file, times):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--changed", action="store_true", help="only what was changed since the last landed commit")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no file after this time")
     parser.add_argument("build", type=pathlib.Path, help="the folder of compile_commands.json")
     options = parser.parse_args()
@@ -107,6 +127,10 @@ def main():
     if not ours:
         sys.exit("tidy: no sources of src/ or apps/ in " + str(build))
     times = changes()
+    since = landed() if options.changed else None
+    if since is not None:
+        times = changed_since(since, times)
+        ours = [entry for entry in ours if changed(pathlib.Path(entry["file"]), times) > 0]
     ours.sort(key=lambda entry: changed(pathlib.Path(entry["file"]), times), reverse=True)
     rules = output_of("clang-tidy", "--version") + (ROOT / ".clang-tidy").read_bytes()
     checked = 0

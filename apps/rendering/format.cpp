@@ -20,7 +20,7 @@ char Conversions::next_part() {
     if (*at_ == '*') return *at_++;
     if (*at_ == '.') {
       after_point_ = true;
-      precision_ = std::atoi(at_ + 1);
+      precision_ = static_cast<int>(std::strtol(at_ + 1, nullptr, 10));
     }
     if (std::strchr("diouxXeEfFgGaAcsp", *at_) != nullptr) break;
   }

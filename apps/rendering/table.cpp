@@ -72,7 +72,7 @@ std::string cell(const std::string& name, std::size_t width) {
 }
 
 std::string number(double value, int decimals, std::size_t columns) {
-  const std::string text = format("%.*f", decimals, value);
+  std::string text = format("%.*f", decimals, value);
   if (text.size() <= columns) return text;
   constexpr std::size_t kSignPointAndExponent = 7;
   const std::size_t digits = columns > kSignPointAndExponent ? columns - kSignPointAndExponent : 1;

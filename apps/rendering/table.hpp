@@ -31,6 +31,7 @@ template <class Row>
 [[nodiscard]] std::vector<std::string> names_of(const std::vector<Row>& rows,
                                                 std::string Row::*name) {
   std::vector<std::string> names;
+  names.reserve(rows.size());
   for (const Row& row : rows) names.push_back(row.*name);
   return names;
 }

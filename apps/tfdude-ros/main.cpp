@@ -37,7 +37,6 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
 
 }  // namespace
 
-// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   Settings settings;
   if (const auto status = tfdude::ros::read_arguments(argc, argv, settings)) return *status;

@@ -56,7 +56,6 @@ int end_parsing(const CLI::App& app, const CLI::ParseError& error, char** argv, 
 
 }  // namespace
 
-// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   Common common;
   common.argv = argv;

@@ -110,7 +110,6 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
 
 }  // namespace
 
-// NOLINTNEXTLINE(bugprone-exception-escape): only a lack of memory throws, and should end it
 int main(int argc, char** argv) {
   Arguments arguments;
   if (const auto status = read_arguments(argc, argv, arguments)) return *status;

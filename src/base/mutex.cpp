@@ -8,6 +8,7 @@
 namespace tfdude {
 namespace {
 
+// NOLINTNEXTLINE(*-avoid-non-const-global-variables): of this thread alone
 thread_local std::array<int, static_cast<std::size_t>(LockRank::kLeaf) + 1> t_held{};
 
 }  // namespace

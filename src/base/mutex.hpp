@@ -8,14 +8,14 @@
 // https://clang.llvm.org/docs/ThreadSafetyAnalysis.html). The standard library's types have no
 // annotations, so these classes wrap them.
 #if defined(__clang__)
-#define TFDUDE_LOCKS(attribute) __attribute__((attribute))
+#define TFDUDE_LOCKS(attribute) __attribute__((attribute))  // NOLINT(*-macro-usage)
 #else
 #define TFDUDE_LOCKS(attribute)
 #endif
 /// Read and write only with that mutex held.
-#define TFDUDE_GUARDED_BY(mutex) TFDUDE_LOCKS(guarded_by(mutex))
+#define TFDUDE_GUARDED_BY(mutex) TFDUDE_LOCKS(guarded_by(mutex))  // NOLINT(*-macro-usage)
 /// Call only with that mutex held.
-#define TFDUDE_REQUIRES(mutex) TFDUDE_LOCKS(requires_capability(mutex))
+#define TFDUDE_REQUIRES(mutex) TFDUDE_LOCKS(requires_capability(mutex))  // NOLINT(*-macro-usage)
 /// Write the reason beside it.
 #define TFDUDE_UNCHECKED_LOCKS TFDUDE_LOCKS(no_thread_safety_analysis)
 

@@ -63,7 +63,7 @@ class PendingRequests {
 
  private:
   struct Outgoing {
-    const Request* request;
+    const Request* request = nullptr;
     bool unsent = false;  // it was due, but could not be sent
   };
   [[nodiscard]] bool has_unsent() const;

@@ -83,9 +83,10 @@ Result<void> Client::update(Handle frame, const Transform& X_PC, const std::opti
     return updated;
   }
   const auto info = participant_->forest().info(frame);
-  if (!info)
+  if (!info) {
     return fail(Errc::kUnknownFrame,
                 "the frame of this handle was removed, or is another client's");
+  }
   return participant_->writes().update({{info->id, X_PC}}, stamp);
 }
 

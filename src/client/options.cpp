@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 std::string_view environment(const char* name) {
-  const char* const value = std::getenv(name);
+  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nothing sets it
   return value != nullptr ? value : "";
 }
 

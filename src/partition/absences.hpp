@@ -90,7 +90,7 @@ class Absences {
  private:
   struct Missed {
     Absent absent;
-    Absent::Kind then;              // what a silence becomes; kSilent: the teller does not know yet
+    Absent::Kind then{};            // what a silence becomes; kSilent: the teller does not know yet
     std::optional<Steady> noticed;  // of a silence
     std::string teller{};           // of hearsay, which is not passed on
     bool pending = false;           // until it counts as gone

@@ -31,6 +31,7 @@ class Directory {
  public:
   /// @param own  the name of the partition that this process serves; empty: none
   Directory(Forest& forest, std::string own);
+  ~Directory() = default;
   Directory(const Directory&) = delete;
   Directory& operator=(const Directory&) = delete;
 
@@ -266,7 +267,7 @@ class Directory {
                    std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
   void tell_claims();
-  Successor* succeed(Known& partition, std::uint64_t incarnation);
+  static Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
   static void note_epoch(Known& partition, const Page& page);
   void put_page(Known& partition, Owner owner, const Page& page, Ids& outdated);

@@ -80,6 +80,7 @@ std::vector<Owner> Directory::movers_of(const JointUse& use) const {
 std::string Directory::named_by_partition(const std::string& joint,
                                           const std::vector<Owner>& owners) const {
   std::vector<std::string> names;
+  names.reserve(owners.size());
   for (const Owner owner : owners) names.push_back(name(owner));
   std::sort(names.begin(), names.end());
   std::string partitions;

@@ -125,7 +125,7 @@ Result<void> Joints::plan(const JointValue& value) {
   return {};
 }
 
-bool Joints::is_newer(const Mover& mover, std::optional<Time> stamp) const {
+bool Joints::is_newer(const Mover& mover, std::optional<Time> stamp) {
   return !stamp || !mover.stamp || *mover.stamp < *stamp;
 }
 

@@ -94,7 +94,7 @@ class Joints {
   };
 
   [[nodiscard]] Result<void> plan(const JointValue& value);
-  [[nodiscard]] bool is_newer(const Mover& mover, std::optional<Time> stamp) const;
+  [[nodiscard]] static bool is_newer(const Mover& mover, std::optional<Time> stamp);
   [[nodiscard]] bool starts_again(const Mover& mover, Time stamp) const;
   void take(const Step& step, std::optional<Time> stamp);
   void forget_removed();

@@ -20,7 +20,7 @@ namespace tfdude {
 struct ObservePlan {
   struct Edge {
     FrameInfo info;
-    ObservedEdge::Way way;
+    ObservedEdge::Way way{};
     std::size_t part = 0;   ///< that asks for it
     std::size_t index = 0;  ///< there
   };

@@ -24,6 +24,14 @@ bool are_too_many(const std::vector<PathCorrelation>& all) {
          });
 }
 
+Result<void> check_new_ids(const FrameSpec& frame) {
+  auto ok = check_new_id(frame.id, "id");
+  for (const CommonError& one : frame.correlation.common_errors) {
+    if (ok) ok = check_new_id(one.source, "source");
+  }
+  return ok;
+}
+
 }  // namespace
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
@@ -45,11 +53,7 @@ Result<void> Partition::load(const std::vector<FrameSpec>& frames, Time now) {
 // Takes all frames or none.
 Result<void> Partition::take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time) {
   for (const FrameSpec& frame : frames) {
-    auto ok = check_new_id(frame.id, "id");
-    for (const CommonError& one : frame.correlation.common_errors) {
-      if (ok) ok = check_new_id(one.source, "source");
-    }
-    if (!ok) return ok;
+    if (auto ok = check_new_ids(frame); !ok) return ok;
   }
   std::vector<std::string> loaded;
   for (const FrameSpec& frame : frames) {

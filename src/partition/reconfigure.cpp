@@ -70,6 +70,22 @@ const std::string* why_at_rest(const Meanings& meanings, const FrameSpec& frame)
   return found != meanings.end() && !found->second.empty() ? &found->second : nullptr;
 }
 
+// Of the frames whose entries are gone, and of those that are left below them.
+void add_removals(const std::map<std::string_view, const FrameSpec*>& gone,
+                  std::map<std::string_view, std::string_view>& parents,
+                  std::vector<ConfiguredChange>& changes) {
+  std::set<std::string_view> removed;
+  for (const auto& [id, entry] : gone) {
+    if (parents.erase(id) == 0) continue;
+    removed.insert(id);
+    changes.push_back({Kind::kRemove, std::string(id), {}});
+  }
+  for (const auto& [id, parent] : parents) {
+    if (removed.count(parent) == 0) continue;
+    changes.push_back({Kind::kOrphan, std::string(id), std::string(parent)});
+  }
+}
+
 }  // namespace
 
 std::vector<StoredJoint> still_meant(const std::vector<StoredJoint>& joints,
@@ -108,21 +124,12 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
     if (*kind != Kind::kCorrelate) parents[entry.id] = entry.parent;
     changes.push_back({*kind, entry.id, *kind == Kind::kCorrelate ? "" : entry.parent});
   }
-  std::set<std::string_view> removed;  // whose entries are gone
-  for (const auto& [id, entry] : before) {
-    if (parents.erase(id) == 0) continue;
-    removed.insert(id);
-    changes.push_back({Kind::kRemove, std::string(id), {}});
-  }
-  for (const auto& [id, parent] : parents) {
-    if (removed.count(parent) == 0) continue;
-    changes.push_back({Kind::kOrphan, std::string(id), std::string(parent)});
-  }
+  add_removals(before, parents, changes);
   return changes;
 }
 
 std::string describe(const ConfiguredChange& change) {
-  const std::string frame = "frame " + quote(change.frame);
+  std::string frame = "frame " + quote(change.frame);
   const std::string under = change.parent.empty() ? " as a root" : " under " + quote(change.parent);
   switch (change.kind) {
     case Kind::kAdd:

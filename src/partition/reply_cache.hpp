@@ -34,8 +34,8 @@ class ReplyCache {
 
   /// The reply given before; kTimeout if it is not known (any more) whether the request was
   /// applied; empty if the request is new and must be applied: then put() its reply.
-  [[nodiscard]] std::optional<Reply> find(const PeerId& peer, const Request& request, Time now);
-  void put(const PeerId& peer, const Request& request, const Reply& reply);
+  [[nodiscard]] std::optional<Reply> find(const PeerId& from, const Request& request, Time now);
+  void put(const PeerId& from, const Request& request, const Reply& reply);
   /// The number of stored replies. O(peers).
   [[nodiscard]] std::size_t size() const;
 

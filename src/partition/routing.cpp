@@ -68,9 +68,10 @@ Result<void> check_subtree(const Directory& directory, const std::vector<FrameIn
   for (const FrameInfo& frame : frames) {
     if (frame.owner == kHeldHere || !directory.owes_change(frame.owner)) continue;
     auto ok = check_reachable(directory, frame.owner);
-    if (ok)
+    if (ok) {
       ok =
           fail(Errc::kTimeout, "partition " + quote(directory.name(frame.owner)) + " is reachable");
+    }
     ok.error().message += ", but its last change has not arrived here: which frames are below " +
                           quote(top) + " is not certain";
     return ok;

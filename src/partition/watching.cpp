@@ -65,7 +65,7 @@ std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
   print.add(partition);
   print.add(incarnation);
   print.add(static_cast<std::uint64_t>(request.period.count()));
-  print.add(std::uint64_t{request.composed});
+  print.add(static_cast<std::uint64_t>(request.composed));
   for (const PathEnds& ends : request.segments) {
     print.add(ends.from);
     print.add(ends.to);

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string_view>
-
 #include <zlib.h>
 
 namespace tfdude::recording {

@@ -27,7 +27,7 @@ CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Peri
 
 Result<void> CommitLoop::start() {
   const Ready ready = effects_.take(false);
-  const Result<void> stored = store(ready);
+  Result<void> stored = store(ready);
   tell(ready, stored);
   if (!stored) return stored;
   {

@@ -35,8 +35,9 @@ class Lookups final : private LookupHost {
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
     auto X_AB = structure_.forest.lookup(a, b);
     if (!X_AB && !is_of_time(X_AB.error())) {
-      X_AB = elsewhere(a, b, {}, discovery_.call_deadline())
-                 .map([](const StampedTransform& found) -> Transform { return found; });
+      X_AB = elsewhere(a, b, {}, discovery_.call_deadline()).map([](const StampedTransform& X) {
+        return Transform{X.pose, X.covariance};
+      });
     }
     return X_AB;
   }

@@ -135,7 +135,7 @@ class MemberRunner final : private CommitLoop::Effects {
   [[nodiscard]] Ready take(bool values_due) override;
   void publish(const Ready& ready) override;
   void take_back(const Ready& ready) override;
-  void reply(const PendingReply& reply) override;
+  void reply(const PendingReply& pending) override;
 
   /// Passes the rules to `input`, under the lock of the structure.
   template <class Input>

@@ -76,7 +76,7 @@ void PendingLookups::add(std::unique_ptr<Lookup> lookup) {
     if (!stopping_) added_.push_back(std::move(lookup));
   }
   waiting_ = true;
-  if (lookup != nullptr) {
+  if (lookup != nullptr) {  // NOLINT(bugprone-use-after-move): null if it was moved
     give_up(*lookup);
   } else {
     wake(urgent_);

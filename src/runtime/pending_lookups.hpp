@@ -74,7 +74,7 @@ class PendingLookups final : private ReplyListener {
   }
   [[nodiscard]] Clock::time_point run();
   [[nodiscard]] Clock::time_point attend(All& all, bool written);
-  void finish(Lookup& lookup, Found found);
+  static void finish(Lookup& lookup, Found found);
   static void give_up(Lookup& lookup);
   [[nodiscard]] std::uint64_t version() const;
 

@@ -67,11 +67,11 @@ std::vector<KnownFrame> Queries::frames_before() {
   std::vector<Part> owners;
   {
     const Lock lock(structure_.mutex);
-    const Directory& directory = structure_.directory;
-    if (!directory.only_heard_of()) return {};
-    for (const Owner owner : directory.reachable_owners()) {
+    if (!structure_.directory.only_heard_of()) return {};
+    for (const Owner owner : structure_.directory.reachable_owners()) {
       const FramesRequest all{{}, {std::string(1, kAnyName)}};
-      owners.push_back({owner, directory.name(owner), Request{0, directory.name(owner), all}});
+      const std::string& name = structure_.directory.name(owner);
+      owners.push_back({owner, name, Request{0, name, all}});
     }
   }
   for (Part& owner : owners) {

@@ -112,7 +112,7 @@ class Requests final : public RequestLink {
   template <class Item, class Body>
   [[nodiscard]] Result<std::vector<Item>> ask_all(const std::string& partition, const Body& body,
                                                   const Deadline& deadline) {
-    return ask_partition<std::vector<Item>>(partition, body, deadline).map([](auto&& answer) {
+    return ask_partition<std::vector<Item>>(partition, body, deadline).map([](auto answer) {
       return std::move(answer).value_or(std::vector<Item>());
     });
   }

@@ -157,7 +157,7 @@ class Sender final : public PlannedSender {
     return fresh;
   }
 
-  Plan plan_for(const std::vector<Destinations>& found) const {
+  [[nodiscard]] Plan plan_for(const std::vector<Destinations>& found) const {
     Plan plan;
     for (std::size_t i = 0; i < names_.size(); ++i) {
       if (found[i].none) plan.unroutable.emplace_back(i, *found[i].none);

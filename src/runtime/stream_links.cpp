@@ -47,7 +47,7 @@ class EdgeLinks final : public SenderLinks<Update> {
   Result<void> apply_here(const Update& update) override {
     return context_.structure.forest.update(update.edges, update.stamp);
   }
-  bool out() const override { return context_.member.out(); }
+  [[nodiscard]] bool out() const override { return context_.member.out(); }
 
  private:
   const Context context_;
@@ -69,7 +69,7 @@ class JointLinks final : public SenderLinks<JointUpdate> {
   Result<void> apply_here(const JointUpdate& update) override {
     return context_.member.try_apply(update).map([](std::size_t) {});
   }
-  bool out() const override { return context_.member.out(); }
+  [[nodiscard]] bool out() const override { return context_.member.out(); }
 
  private:
   const Context context_;

@@ -55,8 +55,6 @@ class WatchMirror {
   /// @param timing  how much history is kept
   WatchMirror(const std::string& a, const std::string& b, WatchRoute route,
               const EdgeTiming& timing);
-  WatchMirror(const WatchMirror&) = delete;
-  WatchMirror& operator=(const WatchMirror&) = delete;
 
   /// As Forest::lookup().
   [[nodiscard]] Result<StampedTransform> lookup(const Query& query) const {

@@ -12,6 +12,7 @@ namespace tfdude {
 void WatchServer::stop() {
   stopped_ = true;
   pushes_.stop();
+  job_.stop();
 }
 
 void WatchServer::push(const PushedValues& values) {

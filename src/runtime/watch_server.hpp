@@ -3,7 +3,7 @@
 #include <atomic>
 
 #include "runtime/context.hpp"
-#include "runtime/push_loop.hpp"
+#include "runtime/pushes.hpp"
 #include "runtime/watch_client.hpp"
 
 namespace tfdude {
@@ -11,14 +11,17 @@ namespace tfdude {
 /// The owner's side of watched paths: answers watch requests, and pushes to watchers, including
 /// this process.
 /// @par Thread safety  All functions are thread-safe.
-class WatchServer final : private PushLoop::Sink {
+class WatchServer final : private Pushes::Sink {
  public:
   /// @param watches  of this process
   WatchServer(const Context& context, WatchClient& watches)
       : context_(context),
         watches_(watches),
-        pushes_(context.threads.push, context.structure.forest, context.options.limits.watches,
-                *this) {}
+        pushes_(context.structure.forest, context.options.limits.watches, *this),
+        job_(context.threads.push, [this] { return pushes_.run(); }) {}
+  ~WatchServer() override { stop(); }
+  WatchServer(const WatchServer&) = delete;
+  WatchServer& operator=(const WatchServer&) = delete;
 
   /// Ends pushing; later watch requests are rejected.
   void stop();
@@ -33,14 +36,16 @@ class WatchServer final : private PushLoop::Sink {
   void on_watcher(std::uint64_t group) { pushes_.tell_all(group); }
 
  private:
-  // PushLoop::Sink
+  // Pushes::Sink
   void push(const PushedValues& values) override;
   void end(std::uint64_t group) override { context_.transport.end_pushing(group); }
+  void wake() override { job_.ask(); }
 
   const Context context_;
   WatchClient& watches_;
   std::atomic<bool> stopped_{false};
-  PushLoop pushes_;  // last: it uses the other members
+  Pushes pushes_;
+  Loop::Job job_;  // last: it uses the other members
 };
 
 }  // namespace tfdude

@@ -181,6 +181,19 @@ void WatchedPartition::carry_over() {
   }
 }
 
+bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, const Message& message,
+                               bool is_late) const {
+  const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
+                       entry.unsampled == known.unsampled && same(entry.X, known.X) &&
+                       entry.correlation == known.correlation;
+  if (repeats) return false;
+  const bool is_old = message.commit <= known.commit;
+  // Of one commit, a part may be missing.
+  if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
+  if (entry.cleared && is_old) return false;
+  return !is_late || (message.reply ? missing_from_.has_value() : period_.count() == 0);
+}
+
 void WatchedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
                              std::vector<WatchedValue>& values) {
   if (entry.index >= group.frames.size()) return;
@@ -192,19 +205,8 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   // Another group, or a reply, has told the edge's value as of a later commit.
   const bool is_old = !begins && message.commit <= known.commit;
   if (is_old) entry.correlation = known.correlation;
-  bool late = false;
-  if (!begins) {
-    const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
-                         entry.unsampled == known.unsampled && same(entry.X, known.X) &&
-                         entry.correlation == known.correlation;
-    if (repeats) return;
-    // Of one commit, a part may be missing.
-    if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return;
-    if (entry.cleared && is_old) return;
-    late = entry.stamp && known.newest && *entry.stamp < *known.newest;
-    const bool wanted = message.reply ? missing_from_.has_value() : period_.count() == 0;
-    if (late && !wanted) return;
-  }
+  const bool late = !begins && entry.stamp && known.newest && *entry.stamp < *known.newest;
+  if (!begins && !is_news(entry, known, message, late)) return;
   known.correlation = entry.correlation;
   if (!late) {
     known.history = entry.history;

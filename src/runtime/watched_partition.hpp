@@ -97,6 +97,9 @@ class WatchedPartition final : public Watched {
   [[nodiscard]] std::vector<Watched::Group> group();
   /// The owner is reachable and has the planned frames. @return whether they or the groups are new
   [[nodiscard]] bool take_over();
+  /// Whether a value of the known history is news.
+  [[nodiscard]] bool is_news(const PushedValue& entry, const Known& known, const Message& message,
+                             bool is_late) const TFDUDE_REQUIRES(mutex_);
   // Appends the value if it is news.
   void admit(const Group& group, PushedValue& entry, const Message& message,
              std::vector<WatchedValue>& values) TFDUDE_REQUIRES(mutex_);

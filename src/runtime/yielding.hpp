@@ -11,8 +11,6 @@ namespace tfdude {
 class Yielding {
  public:
   explicit Yielding(const Context& context);
-  Yielding(const Yielding&) = delete;
-  Yielding& operator=(const Yielding&) = delete;
 
   void stop() { yields_.stop(); }
 

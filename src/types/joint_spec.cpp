@@ -33,10 +33,11 @@ bool is_variance(double variance) { return variance >= 0 && variance <= kMaxVari
 
 Result<void> check_value(const JointValue& joint) {
   const char* what = nullptr;
-  if (!is_position(joint.position))
+  if (!is_position(joint.position)) {
     what = ": position is not a number, or beyond 1e9";
-  else if (joint.variance && !is_variance(*joint.variance))
+  } else if (joint.variance && !is_variance(*joint.variance)) {
     what = ": variance is not a number within 0 to 1e18";
+  }
   if (what == nullptr) return {};
   return fail(Errc::kInvalidInput, "joint " + quote(joint.name) + what);
 }

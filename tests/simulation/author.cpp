@@ -15,29 +15,14 @@ using faults::partition_name;
 
 Author::Author(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
                std::size_t owners)
-    : process_(std::move(process)),
+    : Actor(std::move(process), "author", actor, owners, milliseconds(40)),
       prefix_("c" + std::to_string(number) + "_"),
-      moved_(frames_moved_by(number, owners)),
-      actor_(actor),
-      owners_(owners),
-      random_(0) {
+      moved_(frames_moved_by(number, owners)) {
   faults::fix_bases(model_, owners);
   for (const MovedFrame& one : moved_) {
     model_.fix(one.frame, partition_name(one.owner), {base_of(one.owner), one.value(0)});
   }
   remember();
-}
-
-void Author::start() { next(); }
-
-// Each step has random numbers of its own, so that leaving one out changes no other.
-void Author::next() {
-  if (stopped_) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  const Instant pause = std::chrono::microseconds(random_.index(40'000));
-  process_->later("author", pause + std::exchange(rest_, Instant(0)), [self = shared_from_this()] {
-    if (!self->stopped_) self->step();
-  });
 }
 
 OperationKind Author::draw_kind() {
@@ -51,9 +36,7 @@ OperationKind Author::draw_kind() {
 }
 
 void Author::step() {
-  Surroundings& world = process_->world();
-  if (world.plan.leaves_out(actor_, steps_)) return next();
-  world.did(actor_, steps_);
+  const Surroundings& world = process_->world();
   if (!world.plan.stores || random_.uniform(0, 1) < world.plan.contest) return contest();
   const OperationKind kind = draw_kind();
   if (world.plan.weight(kind) <= 0) return next();
@@ -139,8 +122,9 @@ void Author::change_here(const std::shared_ptr<Process>& node, const std::string
   began_ = process_->world().timeline.now();
   by_node_ = true;
   auto over = std::make_shared<bool>(false);
-  const auto end = [self = shared_from_this(), what, then, over](const Result<void>& outcome) {
-    if (!std::exchange(*over, true)) self->conclude(what, outcome, then);
+  const auto end = [this, self = shared_from_this(), what, then,
+                    over](const Result<void>& outcome) {
+    if (!std::exchange(*over, true)) conclude(what, outcome, then);
   };
   const Reply reply = node->answer(request);
   // The author knows of the change, so its process has to hear of it before it removes frames.
@@ -159,8 +143,8 @@ void Author::begin(const std::string& what, RunningCall::Route route, Then then)
   began_ = process_->world().timeline.now();
   by_node_ = false;
   process_->begin(what, std::move(route),
-                  [self = shared_from_this(), what, then = std::move(then)](
-                      const Result<void>& outcome) { self->conclude(what, outcome, then); });
+                  [this, self = shared_from_this(), what, then = std::move(then)](
+                      const Result<void>& outcome) { conclude(what, outcome, then); });
 }
 
 void Author::conclude(const std::string& what, const Result<void>& outcome, const Then& then) {

@@ -12,8 +12,8 @@
 
 #include "faults/frames.hpp"
 #include "faults/model.hpp"
+#include "simulation/actor.hpp"
 #include "simulation/joints.hpp"
-#include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 
@@ -22,29 +22,23 @@ inline constexpr std::size_t kContested = 4;
 
 /// A client that makes one call after the other and knows the possible results. It knows all about
 /// its own frames, because no other client changes them.
-class Author : public std::enable_shared_from_this<Author> {
+class Author final : public Actor {
  public:
   /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
   Author(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
          std::size_t owners);
 
-  /// Goes on until stop().
-  void start();
-  void stop() { stopped_ = true; }
   /// A partition has lost its stored changes from an instant on.
   void lost_power(const std::string& partition, Instant first);
   /// Whether it ever has.
   [[nodiscard]] bool has_lost_power(const std::string& partition) const {
     return losses_.count(partition) > 0;
   }
-  /// How many frames of its own it has tried to add.
-  [[nodiscard]] std::size_t added() const { return added_; }
+  [[nodiscard]] std::size_t added() const override { return added_; }
 
   [[nodiscard]] faults::Model& model() { return model_; }
-  [[nodiscard]] Process& process() { return *process_; }
   [[nodiscard]] const Surroundings& world() const { return process_->world(); }
-  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
 
   /// Forgets a partition that is not reachable.
   void forget(const std::string& partition);
@@ -57,8 +51,8 @@ class Author : public std::enable_shared_from_this<Author> {
   void look_up(const std::string& a, const std::string& b, bool quiet);
 
  private:
-  void next();
-  void step();
+  void step() override;
+  [[nodiscard]] std::string title() const override { return prefix_; }
   void add();
   void move();
   void update();
@@ -67,7 +61,6 @@ class Author : public std::enable_shared_from_this<Author> {
   void forget_one();
   void contest();
   using RouteOf = std::function<Result<std::vector<Part>>(Process& caller)>;
-  using Then = std::function<void(const Result<void>&)>;
 
   void change(const std::string& what, const std::string& owner, const RouteOf& route, Then then);
   void change_here(const std::shared_ptr<Process>& node, const std::string& what,
@@ -90,24 +83,16 @@ class Author : public std::enable_shared_from_this<Author> {
   [[nodiscard]] std::string any(const std::vector<std::string>& ids);
   [[nodiscard]] std::string any_anchor();
 
-  std::shared_ptr<Process> process_;
   const std::string prefix_;
   const std::vector<MovedFrame> moved_;  // by its joint
-  const std::size_t actor_;
-  const std::size_t owners_;
-  testing::Random random_;  // of the current step
   faults::Model model_;
-  std::map<std::string, std::size_t> outcomes_;
   // What was known after each operation, if a power loss may undo some of them.
   std::deque<std::pair<Instant, faults::Model>> known_;
   std::map<std::string, Instant> losses_;  // the last power loss, by partition
   std::map<std::string, Instant> forgotten_;
   Instant began_{};       // of the current operation
   bool by_node_ = false;  // it was made by its owner's Node
-  Instant rest_{};        // before the next one
-  std::size_t steps_ = 0;
   std::size_t added_ = 0;
-  bool stopped_ = false;
 };
 
 }  // namespace tfdude::simulation

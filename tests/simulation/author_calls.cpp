@@ -219,17 +219,17 @@ void Author::forget(const std::string& partition) {
 
 void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
   const auto task = process_->lookup(a, b);
-  process_->begin(
-      "lookup of " + b + " in " + a, task,
-      [self = shared_from_this(), a, b, task, quiet,
-       began = process_->world().timeline.now()](const Result<void>& outcome) {
-        const auto X_AB = outcome.map([&] { return task->X_AB(); });
-        const std::string code = X_AB ? "done" : std::string(to_string(X_AB.error().code));
-        ++self->outcomes_["lookup " + code];
-        self->process_->world().trace(self->prefix_ + " lookup " + a + " " + b + ": " + code);
-        self->judge(a, b, X_AB, quiet, began);
-        if (!quiet) self->next();
-      });
+  process_->begin("lookup of " + b + " in " + a, task,
+                  [this, self = shared_from_this(), a, b, task, quiet,
+                   began = process_->world().timeline.now()](const Result<void>& outcome) {
+                    const auto X_AB = outcome.map([&] { return task->X_AB(); });
+                    const std::string code =
+                        X_AB ? "done" : std::string(to_string(X_AB.error().code));
+                    ++outcomes_["lookup " + code];
+                    process_->world().trace(prefix_ + " lookup " + a + " " + b + ": " + code);
+                    judge(a, b, X_AB, quiet, began);
+                    if (!quiet) next();
+                  });
 }
 
 // A partition that has lost something since the lookup began may be different by now.

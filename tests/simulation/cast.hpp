@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "simulation/actor.hpp"
 #include "simulation/author.hpp"
 #include "simulation/follower.hpp"
 #include "simulation/plan.hpp"
@@ -25,10 +26,7 @@ struct Configured {
   void change(std::size_t how);
 };
 
-class Measurer;
-class Pacer;
 class Streamer;
-class Waiter;
 
 /// The participants of a run.
 struct Cast {
@@ -52,12 +50,10 @@ struct Cast {
   const std::size_t wild;              ///< the last owner, which may be renamed and replaced
   int renamed = 0;                     ///< how often
   std::vector<Configured> configured;  ///< by owner
+  std::vector<std::shared_ptr<Actor>> actors;  // also those of the next three lists
   std::vector<std::shared_ptr<Author>> authors;
   std::vector<std::shared_ptr<Follower>> followers;
   std::vector<std::shared_ptr<Sampler>> samplers;
-  std::vector<std::shared_ptr<Waiter>> waiters;
-  std::vector<std::shared_ptr<Measurer>> measurers;
-  std::vector<std::shared_ptr<Pacer>> pacers;
   std::vector<std::shared_ptr<Streamer>> streamers;
 
   [[nodiscard]] std::string name_of_daemon(std::size_t owner) const;

@@ -28,46 +28,28 @@ Transform second_edge(std::size_t value) { return at(0, -static_cast<double>(val
 
 Follower::Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
                    std::size_t owners)
-    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
+    : Actor(std::move(process), "follower", actor, owners, milliseconds(60)), number_(number) {}
 
 std::string Follower::id(const char* which) const {
   return "w" + std::to_string(number_) + "_" + std::to_string(generation_) + "_" + which;
 }
 
-void Follower::start() { next(); }
-
-void Follower::next() {
-  if (stopped_) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  const Instant pause = std::chrono::microseconds(random_.index(60'000));
-  process_->later("follower", pause + std::exchange(rest_, Instant(0)),
-                  [self = shared_from_this()] {
-                    if (!self->stopped_) self->step();
-                  });
-}
-
 void Follower::step() {
-  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
-  process_->world().did(actor_, steps_);
   if (watch_ == nullptr) return arm_added_ ? add_tip() : restart();
   if (random_.index(3) == 0) return move();
   write();
 }
 
-void Follower::begin(const std::string& what, RunningCall::Route route,
-                     std::function<void(const Result<void>&)> then) {
+void Follower::begin(const std::string& what, RunningCall::Route route, Then then) {
   process_->world().trace(tip() + ": begins to " + what);
   began_ = process_->world().timeline.now();
-  process_->begin(
-      what, std::move(route), [self = shared_from_this(), what, then](const Result<void>& outcome) {
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        self->process_->world().trace(self->tip() + ": " + what + ": " + code);
-        ++self->outcomes_["follower: " + what.substr(0, what.find(' ')) + " " + code];
-        // What was sent without an answer arrives before what is sent next, or is lost.
-        if (!outcome) self->rest_ = self->process_->world().network.longest_delay();
-        then(outcome);
-        self->next();
-      });
+  Actor::begin(what, RunningCall::change(std::move(route)),
+               [this, then = std::move(then)](const Result<void>& outcome) {
+                 // What was sent without an answer arrives before what is sent next, or is lost.
+                 if (!outcome) rest_ = process_->world().network.longest_delay();
+                 then(outcome);
+                 next();
+               });
 }
 
 // Uses new names of frames, because the state of the former ones is not known.

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "simulation/process.hpp"
+#include "simulation/actor.hpp"
 
 namespace tfdude::simulation {
 
@@ -18,23 +16,19 @@ namespace tfdude::simulation {
 /// continuously reads them by a watched path. Each value must be one that was written, of one
 /// commit, in a place where the frames were, and never older than an earlier value while their
 /// owner lives.
-class Follower : public std::enable_shared_from_this<Follower> {
+class Follower final : public Actor {
  public:
   /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
   Follower(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
            std::size_t owners);
 
-  /// Goes on until stop(); looks at what comes after that, too.
-  void start();
-  void stop() { stopped_ = true; }
   /// A partition has lost some of its stored changes.
   void lost_power(const std::string& partition);
 
-  [[nodiscard]] Process& process() { return *process_; }
-  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
-  /// How many frames it has tried to add.
-  [[nodiscard]] std::size_t added() const { return 2 * static_cast<std::size_t>(generation_); }
+  [[nodiscard]] std::size_t added() const override {
+    return 2 * static_cast<std::size_t>(generation_);
+  }
   /// The owner of both edges; empty: it has none.
   [[nodiscard]] const std::string& partition() const { return partition_; }
   [[nodiscard]] std::string arm() const { return id("arm"); }
@@ -53,8 +47,8 @@ class Follower : public std::enable_shared_from_this<Follower> {
     bool replaced = false;        // for sure
   };
 
-  void next();
-  void step();
+  void step() override;
+  [[nodiscard]] std::string title() const override { return tip(); }
   void restart();
   void add_tip();
   void write();
@@ -64,8 +58,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   void written(std::size_t value);
   [[nodiscard]] std::vector<EdgeUpdate> both(std::size_t value) const;
   void move();
-  void begin(const std::string& what, RunningCall::Route route,
-             std::function<void(const Result<void>&)> then);
+  void begin(const std::string& what, RunningCall::Route route, Then then);
   void look();
   void judge(const StampedTransform& X);
   void forget_order_after_restart();
@@ -74,11 +67,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   [[nodiscard]] std::string id(const char* which) const;
   [[nodiscard]] bool may_be_lost() const { return lost_ >= began_; }
 
-  std::shared_ptr<Process> process_;
   const std::size_t number_;
-  const std::size_t actor_;
-  const std::size_t owners_;
-  testing::Random random_;  // of the current step
   std::shared_ptr<WatchedPath> watch_;
   std::string partition_;
   bool arm_added_ = false;        // and not the tip yet
@@ -94,11 +83,7 @@ class Follower : public std::enable_shared_from_this<Follower> {
   std::size_t stored_ = 0;         // of these, the newest that it is known to have stored
   std::size_t floor_ = 0;          // what it had stored when it was last started again
   Instant began_{};                // of the current operation
-  Instant rest_{};                 // before the next one
   Instant lost_{-1};               // when its owner last lost changes
-  std::size_t steps_ = 0;
-  std::map<std::string, std::size_t> outcomes_;
-  bool stopped_ = false;
 };
 
 }  // namespace tfdude::simulation

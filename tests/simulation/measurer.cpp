@@ -27,7 +27,7 @@ double variance_of(const Transform& X) { return X.covariance.of_specified().uppe
 
 Measurer::Measurer(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
                    std::size_t owners)
-    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
+    : Actor(std::move(process), "measurer", actor, owners, milliseconds(150)), number_(number) {}
 
 std::string Measurer::frame(std::size_t number) const {
   if (number == 0) return base_;
@@ -35,18 +35,11 @@ std::string Measurer::frame(std::size_t number) const {
          std::to_string(number);
 }
 
-void Measurer::next() {
-  if (stopped_ || open_ > 0) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  process_->later("measurer", std::chrono::microseconds(random_.index(150'000)),
-                  [self = shared_from_this()] {
-                    if (!self->stopped_) self->step();
-                  });
+void Measurer::go_on() {
+  if (open_ == 0) next();
 }
 
 void Measurer::step() {
-  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
-  process_->world().did(actor_, steps_);
   if (doubtful_ || owner_changed()) restart();
   if (edges_ < kEdges) return add();
   if (random_.index(3) == 0) return look_up();
@@ -55,23 +48,17 @@ void Measurer::step() {
   observe();
   if (two) observe();
   --open_;
-  next();
+  go_on();
 }
 
-void Measurer::begin(const std::string& what, const std::shared_ptr<Task>& task,
-                     std::function<void(const Result<void>&)> then) {
+void Measurer::begin(const std::string& what, const std::shared_ptr<Task>& task, Then then) {
   ++open_;
-  process_->begin(
-      what, task,
-      [self = shared_from_this(), what, then = std::move(then)](const Result<void>& outcome) {
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        self->process_->world().trace(self->frame(self->edges_) + ": " + what + ": " + code);
-        ++self->outcomes_["measurer: " + what.substr(0, what.find(' ')) + " " + code];
-        if (!outcome) self->doubtful_ = true;
-        then(outcome);
-        --self->open_;
-        self->next();
-      });
+  Actor::begin(what, task, [this, then = std::move(then)](const Result<void>& outcome) {
+    if (!outcome) doubtful_ = true;
+    then(outcome);
+    --open_;
+    go_on();
+  });
 }
 
 // Uses new names of frames, because the state of the former ones is not known.

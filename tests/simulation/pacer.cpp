@@ -18,25 +18,14 @@ double seconds_of(Instant time) { return std::chrono::duration<double>(time).cou
 
 Pacer::Pacer(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
              std::size_t owners)
-    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
+    : Actor(std::move(process), "pacer", actor, owners, milliseconds(100)), number_(number) {}
 
 std::string Pacer::frame(std::size_t edge) const {
   return "p" + std::to_string(number_) + "_" + std::to_string(generation_) + "_" +
          std::to_string(edge);
 }
 
-void Pacer::next() {
-  if (stopped_) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  process_->later("pacer", std::chrono::microseconds(random_.index(100'000)),
-                  [self = shared_from_this()] {
-                    if (!self->stopped_) self->step();
-                  });
-}
-
 void Pacer::step() {
-  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
-  process_->world().did(actor_, steps_);
   if (doubtful_) restart();
   for (std::size_t k = 0; k < kEdges; ++k) {
     if (edges_.at(k).owner == 0) return add(k);
@@ -50,19 +39,14 @@ void Pacer::step() {
 
 void Pacer::begin(const std::string& what, const std::shared_ptr<Task>& task,
                   std::function<void()> then) {
-  process_->begin(
-      what, task,
-      [self = shared_from_this(), what, task, then = std::move(then)](const Result<void>& outcome) {
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        self->process_->world().trace(self->frame(0) + ": " + what + ": " + code);
-        ++self->outcomes_["pacer: " + what.substr(0, what.find(' ')) + " " + code];
-        if (outcome) {
-          then();
-        } else {
-          self->doubtful_ = true;
-        }
-        self->next();
-      });
+  Actor::begin(what, task, [this, then = std::move(then)](const Result<void>& outcome) {
+    if (outcome) {
+      then();
+    } else {
+      doubtful_ = true;
+    }
+    next();
+  });
 }
 
 // Uses new names of frames, because the state of the former ones is not known.

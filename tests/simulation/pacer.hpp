@@ -3,12 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "simulation/process.hpp"
+#include "simulation/actor.hpp"
 
 namespace tfdude::simulation {
 
@@ -19,21 +18,14 @@ namespace tfdude::simulation {
 /// The answer must hold for one instant that all edges have, and be at most two samples of the
 /// slowest edge older than the latest one. The client begins another path when it cannot know what
 /// the owners have: after an error, and after one of them was started again.
-class Pacer : public std::enable_shared_from_this<Pacer> {
+class Pacer final : public Actor {
  public:
   /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
   Pacer(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
         std::size_t owners);
 
-  /// Goes on until stop().
-  void start() { next(); }
-  void stop() { stopped_ = true; }
-
-  [[nodiscard]] Process& process() { return *process_; }
-  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
-  /// How many frames it has tried to add.
-  [[nodiscard]] std::size_t added() const { return kEdges * generation_; }
+  [[nodiscard]] std::size_t added() const override { return kEdges * generation_; }
 
  private:
   static constexpr std::size_t kEdges = 2;
@@ -44,8 +36,8 @@ class Pacer : public std::enable_shared_from_this<Pacer> {
     std::vector<Instant> stamps;  // of its samples
   };
 
-  void next();
-  void step();
+  void step() override;
+  [[nodiscard]] std::string title() const override { return frame(0); }
   void restart();
   void add(std::size_t edge);
   void write(std::size_t edge);
@@ -57,19 +49,12 @@ class Pacer : public std::enable_shared_from_this<Pacer> {
   [[nodiscard]] Instant clock() const { return ahead_ + process_->world().timeline.now(); }
   [[nodiscard]] std::string frame(std::size_t edge) const;
 
-  std::shared_ptr<Process> process_;
   const std::size_t number_;
-  const std::size_t actor_;
-  const std::size_t owners_;
-  testing::Random random_;  // of the current step
   std::string base_;
   std::array<Edge, kEdges> edges_;
   std::size_t generation_ = 0;  // of the path
   Instant ahead_{};             // of the clock
   bool doubtful_ = true;
-  std::size_t steps_ = 0;
-  std::map<std::string, std::size_t> outcomes_;
-  bool stopped_ = false;
 };
 
 }  // namespace tfdude::simulation

@@ -23,7 +23,6 @@ constexpr std::uint64_t kLooksPerRareLook = 3;
 constexpr Instant kTellCountEvery = milliseconds(200);
 constexpr Instant kLookForGone = milliseconds(50);
 constexpr Instant kYieldEvery = milliseconds(100);
-constexpr Instant kPushAfter = std::chrono::microseconds(20);
 
 }  // namespace
 
@@ -45,12 +44,7 @@ Process::Process(Surroundings& world, Setting setting)
       forest_([this] { return wall(); }),
       directory_(forest_, setting_.partition),
       member_(forest_, directory_, setting_.partition),
-      pushes_(
-          forest_,
-          [this] {
-            later("push", kPushAfter, [this] { pushes_.push_due(world_.timeline.now()); });
-          },
-          [this](const PushedValues& pushed) { push(pushed); }),
+      pushes_(forest_, SIZE_MAX, *this),
       watches_(*this) {
   directory_.changes().watch();
 }

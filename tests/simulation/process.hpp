@@ -14,12 +14,12 @@
 #include "calls/tasks.hpp"
 #include "partition/claiming.hpp"
 #include "partition/member.hpp"
+#include "runtime/pushes.hpp"
 #include "simulation/clock.hpp"
 #include "simulation/disk.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/network.hpp"
 #include "simulation/planned.hpp"
-#include "simulation/pushes.hpp"
 #include "simulation/running_call.hpp"
 #include "simulation/steps.hpp"
 #include "simulation/watches.hpp"
@@ -56,7 +56,9 @@ PeerId peer_of(std::uint64_t process);
 std::uint64_t process_of(const PeerId& peer);
 
 /// One process of a participant: the loops that it runs around its Member, in simulated time.
-class Process : public std::enable_shared_from_this<Process>, public RequestLink {
+class Process : public std::enable_shared_from_this<Process>,
+                public RequestLink,
+                private Pushes::Sink {
  public:
   /// What a life begins with.
   struct Setting {
@@ -166,7 +168,7 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
   }
   /// Calls that have not ended, and changes that wait to be stored.
   [[nodiscard]] std::size_t open_calls() const;
-  [[nodiscard]] std::vector<std::uint64_t> pushed_groups() const { return pushes_.groups(); }
+  [[nodiscard]] const std::set<std::uint64_t>& pushed_groups() const { return pushed_groups_; }
   /// id, parent and partition of each frame whose owner is reachable; sorted.
   /// @param except  partitions that are left out
   [[nodiscard]] std::vector<std::string> structure(const std::set<std::string>& except) const;
@@ -190,8 +192,13 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
 
   void reply_to(std::uint64_t peer, const Reply& reply);
   void answer_watch(std::uint64_t from, const Request& request);
-  void look_at_leases();
-  void push(const PushedValues& pushed);
+  void push_by(Pushes::Clock::time_point time);
+  // Pushes::Sink
+  void push(const PushedValues& pushed) override;
+  void end(std::uint64_t group) override { pushed_groups_.erase(group); }
+  void wake() override;
+  [[nodiscard]] Pushes::Clock::time_point now() const override { return world_.timeline.steady(); }
+
   void each_server(const std::string& partition, const std::function<void(std::uint64_t)>& tell);
   void tick();
   void look_for_silent();
@@ -230,6 +237,8 @@ class Process : public std::enable_shared_from_this<Process>, public RequestLink
   std::vector<std::weak_ptr<Planned>> planned_;
   std::uint64_t told_structure_ = 0;
   Pushes pushes_;
+  std::set<std::uint64_t> pushed_groups_;
+  Pushes::Clock::time_point push_at_ = Pushes::kNever;
   Watches watches_;
   std::uint64_t pushed_ = 0;
   std::vector<std::function<void()>> backlog_;

@@ -7,7 +7,7 @@
 namespace tfdude::simulation {
 namespace {
 
-constexpr Instant kLookAtLeases = milliseconds(1000);
+constexpr Instant kPushAfter = std::chrono::microseconds(20);
 // How much later than its deadline a call may end.
 constexpr Instant kEndsWithin = milliseconds(20);
 
@@ -48,10 +48,10 @@ void Process::on_reply(std::uint64_t from, const std::string& partition, const R
 void Process::answer_watch(std::uint64_t from, const Request& request) {
   const auto& body = std::get<WatchRequest>(request.body);
   const std::uint64_t group = watch_group(partition(), member_.presence().incarnation, body);
-  if (pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
-  auto pushed = pushes_.watch(group, body, world_.timeline.now());
+  auto pushed = pushes_.watch(group, body);
   Reply reply{request.sequence, 0, Done{}};
   if (pushed) {
+    pushed_groups_.insert(group);
     reply.body = *std::move(pushed);
   } else {
     reply.body = std::move(pushed.error());
@@ -72,10 +72,17 @@ void Process::on_update(const JointUpdate& update) {
   if (member_.partition()->apply(update)) world_.count("a streamed joint was moved");
 }
 
-// Groups that are not renewed end even if nothing is written.
-void Process::look_at_leases() {
-  pushes_.push_due(world_.timeline.now());
-  if (!pushes_.groups().empty()) later("leases", kLookAtLeases, [this] { look_at_leases(); });
+void Process::wake() { push_by(now() + kPushAfter); }
+
+// As a job of a Loop.
+void Process::push_by(Pushes::Clock::time_point time) {
+  if (time >= push_at_) return;
+  push_at_ = time;
+  later("push", time - now(), [this, time] {
+    if (push_at_ != time) return;
+    push_at_ = Pushes::kNever;
+    push_by(pushes_.run());
+  });
 }
 
 void Process::push(const PushedValues& pushed) {

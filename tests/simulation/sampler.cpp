@@ -28,24 +28,13 @@ Transform value_of(std::size_t number) {
 
 Sampler::Sampler(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
                  std::size_t owners)
-    : process_(std::move(process)), number_(number), actor_(actor), owners_(owners), random_(0) {}
+    : Actor(std::move(process), "sampler", actor, owners, milliseconds(40)), number_(number) {}
 
 std::string Sampler::frame() const {
   return "s" + std::to_string(number_) + "_" + std::to_string(generation_);
 }
 
-void Sampler::next() {
-  if (stopped_) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  const Instant pause = std::chrono::microseconds(random_.index(40'000));
-  process_->later("sampler", pause + std::exchange(rest_, Instant(0)), [self = shared_from_this()] {
-    if (!self->stopped_) self->step();
-  });
-}
-
 void Sampler::step() {
-  if (process_->world().plan.leaves_out(actor_, steps_)) return next();
-  process_->world().did(actor_, steps_);
   if (!added_) return add();
   if (random_.index(30) == 0) {
     samples_.jump_back();
@@ -57,18 +46,12 @@ void Sampler::step() {
 }
 
 void Sampler::begin(const std::string& what, const std::shared_ptr<Task>& task, Then then) {
-  process_->begin(
-      what, task,
-      [self = shared_from_this(), what, then = std::move(then)](const Result<void>& outcome) {
-        Surroundings& world = self->process_->world();
-        const std::string code = outcome ? "done" : std::string(to_string(outcome.error().code));
-        world.trace(self->frame() + ": " + what + ": " + code);
-        ++self->outcomes_["sampler: " + what.substr(0, what.find(' ')) + " " + code];
-        // What was sent without an answer arrives before what is sent next, or is lost.
-        if (!outcome) self->rest_ = world.network.longest_delay();
-        then(outcome);
-        if (!outcome && denies(outcome.error().code)) self->added_ = false;
-      });
+  Actor::begin(what, task, [this, then = std::move(then)](const Result<void>& outcome) {
+    // What was sent without an answer arrives before what is sent next, or is lost.
+    if (!outcome) rest_ = process_->world().network.longest_delay();
+    then(outcome);
+    if (!outcome && denies(outcome.error().code)) added_ = false;
+  });
 }
 
 void Sampler::check(const Samples::Broken& broken) {

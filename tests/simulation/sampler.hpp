@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -10,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "simulation/process.hpp"
+#include "simulation/actor.hpp"
 #include "simulation/samples.hpp"
 
 namespace tfdude::simulation {
@@ -18,21 +16,14 @@ namespace tfdude::simulation {
 /// A client that writes stamped samples of a frame of its own, by requests and by a stream, in
 /// order and late, with a clock that jumps back; and that looks them up at instants, and watches
 /// them.
-class Sampler : public std::enable_shared_from_this<Sampler> {
+class Sampler final : public Actor {
  public:
   /// @param actor  the number by which its operations are counted
   /// @param owners  whose partitions it uses; none of them is renamed
   Sampler(std::shared_ptr<Process> process, std::size_t number, std::size_t actor,
           std::size_t owners);
 
-  /// Goes on until stop().
-  void start() { next(); }
-  void stop() { stopped_ = true; }
-
-  [[nodiscard]] Process& process() { return *process_; }
-  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
-  /// How many frames it has tried to add.
-  [[nodiscard]] std::size_t added() const { return generation_; }
+  [[nodiscard]] std::size_t added() const override { return generation_; }
   /// The owner of the frame; empty: it has none.
   [[nodiscard]] const std::string& partition() const { return partition_; }
   [[nodiscard]] std::string frame() const;
@@ -47,10 +38,8 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   }
 
  private:
-  using Then = RunningCall::Then;
-
-  void next();
-  void step();
+  void step() override;
+  [[nodiscard]] std::string title() const override { return frame(); }
   void add();
   void write();
   void stream(std::size_t number);
@@ -64,11 +53,7 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   [[nodiscard]] std::vector<EdgeUpdate> edge(std::size_t number) const;
   [[nodiscard]] Time any_instant();
 
-  std::shared_ptr<Process> process_;
   const std::size_t number_;
-  const std::size_t actor_;
-  const std::size_t owners_;
-  testing::Random random_;  // of the current step
   Samples samples_;
   std::set<std::size_t> streamed_;  // their numbers
   std::shared_ptr<WatchedPath> watch_;
@@ -79,10 +64,6 @@ class Sampler : public std::enable_shared_from_this<Sampler> {
   std::string partition_;
   bool added_ = false;
   std::size_t generation_ = 0;  // of the frame
-  std::size_t steps_ = 0;
-  std::map<std::string, std::size_t> outcomes_;
-  Instant rest_{};  // before the next step
-  bool stopped_ = false;
 };
 
 }  // namespace tfdude::simulation

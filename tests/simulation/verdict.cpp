@@ -4,10 +4,7 @@
 #include <map>
 #include <set>
 
-#include "simulation/measurer.hpp"
-#include "simulation/pacer.hpp"
 #include "simulation/streamer.hpp"
-#include "simulation/waiter.hpp"
 
 namespace tfdude::simulation {
 namespace {
@@ -77,15 +74,12 @@ void Verdict::check() {
     if (hears_all(streamer->process())) streamer->check(cast_);
   }
   await_calls();
-  const auto add = [&](const auto& actor) {
-    if (hears_all(actor->process())) all.push_back(&actor->process());
+  const auto add = [&](Process& process) {
+    const bool is_new = std::find(all.begin(), all.end(), &process) == all.end();
+    if (is_new && hears_all(process)) all.push_back(&process);
   };
-  for (const auto& follower : cast_.followers) add(follower);
-  for (const auto& sampler : cast_.samplers) add(sampler);
-  for (const auto& waiter : cast_.waiters) add(waiter);
-  for (const auto& measurer : cast_.measurers) add(measurer);
-  for (const auto& pacer : cast_.pacers) add(pacer);
-  for (const auto& streamer : cast_.streamers) add(streamer);
+  for (const auto& actor : cast_.actors) add(actor->process());
+  for (const auto& streamer : cast_.streamers) add(streamer->process());
   for (Process* one : all) check_kept(*one);
 }
 

@@ -20,42 +20,31 @@ constexpr Instant kCalmAfter = milliseconds(5000);
 
 }  // namespace
 
-Waiter::Waiter(std::shared_ptr<Process> process, std::size_t actor)
-    : process_(std::move(process)), actor_(actor), random_(0) {}
+Waiter::Waiter(std::shared_ptr<Process> process, std::size_t actor, std::size_t owners)
+    : Actor(std::move(process), "waiter", actor, owners, milliseconds(200)) {}
 
 void Waiter::start() {
-  begin();
-  process_->keep_planned(shared_from_this());
+  Planned::begin();
+  process_->keep_planned(std::static_pointer_cast<Waiter>(shared_from_this()));
   next();
-}
-
-void Waiter::next() {
-  if (stopped_) return;
-  random_ = testing::Random(process_->world().plan.seed_of(actor_, ++steps_));
-  process_->later("waiter", std::chrono::microseconds(random_.index(200'000)),
-                  [self = shared_from_this()] {
-                    if (!self->stopped_) self->step();
-                  });
 }
 
 void Waiter::step() {
   Surroundings& world = process_->world();
-  if (world.plan.leaves_out(actor_, steps_)) return next();
-  world.did(actor_, steps_);
   if (may_remove()) return remove();
   base_ = random_.index(world.plan.owners);
   frame_ = random_.index(3) == 0 ? extra_of(base_) : base_of(base_);
   limit_.emplace(milliseconds(500 + random_.index(8000)), now());
   had_to_ = false;
-  begin();
+  Planned::begin();
   if (random_.index(2) == 0) return wait({Errc::kTimeout, "not asked yet"});
   const auto task = process_->lookup("world", frame_);
   process_->begin("lookup of " + frame_ + ", which may wait", task,
-                  [self = shared_from_this(), task](const Result<void>& outcome) {
-                    const bool waits = !outcome && is_worth_waiting(outcome.error(), {}) &&
-                                       !self->limit_->over(self->now());
-                    if (waits) return self->wait(outcome.error());
-                    self->end(outcome.map([&] { return task->X_AB(); }));
+                  [this, self = shared_from_this(), task](const Result<void>& outcome) {
+                    const bool waits =
+                        !outcome && is_worth_waiting(outcome.error(), {}) && !limit_->over(now());
+                    if (waits) return wait(outcome.error());
+                    end(outcome.map([&] { return task->X_AB(); }));
                   });
 }
 
@@ -68,11 +57,10 @@ void Waiter::remove() {
   process_->begin(
       "remove what a deputy has",
       [this] { return route_remove(process_->forest(), process_->directory(), kHanded); },
-      [self = shared_from_this()](const Result<void>& removed) {
-        if (removed) self->process_->world().handed_removed = true;
-        ++self->outcomes_[removed ? "a deputy's frame was removed"
-                                  : "a deputy's frame was not removed"];
-        self->next();
+      [this, self = shared_from_this()](const Result<void>& removed) {
+        if (removed) process_->world().handed_removed = true;
+        ++outcomes_[removed ? "a deputy's frame was removed" : "a deputy's frame was not removed"];
+        next();
       });
 }
 
@@ -102,8 +90,8 @@ void Waiter::renew() {
 }
 
 void Waiter::all_replied() {
-  process_->later("lookup replies", Instant(0), [self = shared_from_this()] {
-    if (self->lookup_ != nullptr) self->attend(false);
+  process_->later("lookup replies", Instant(0), [this, self = shared_from_this()] {
+    if (lookup_ != nullptr) attend(false);
   });
 }
 
@@ -130,7 +118,7 @@ Result<void> Waiter::send(const std::string& partition, const Request& request,
 void Waiter::wait(Error last) {
   sent_.clear();
   lookup_ = std::make_shared<WaitingLookup>(wanted(), *limit_, std::move(last), now());
-  begin();
+  Planned::begin();
   Surroundings& world = process_->world();
   world.invariants.called(
       process_, [weak = std::weak_ptr(lookup_)] { return weak.expired(); },
@@ -155,8 +143,8 @@ void Waiter::attend(bool written) {
   had_to_ = had_to_ || lookup_->last().message != "not asked yet";
   const auto next = lookup_->next();
   if (std::exchange(wakes_, next) == next) return;
-  process_->later("lookup", next - now(), [self = shared_from_this(), next] {
-    if (self->lookup_ != nullptr && self->wakes_ == next) self->attend(false);
+  process_->later("lookup", next - now(), [this, self = shared_from_this(), next] {
+    if (lookup_ != nullptr && wakes_ == next) attend(false);
   });
 }
 
@@ -169,7 +157,7 @@ void Waiter::end(const Result<StampedTransform>& X_WB) {
       world.plan.lasting.empty() && world.timeline.now() > world.plan.storm + kCalmAfter;
   if (!X_WB && calm && route()) world.violation("a lookup waits for nothing", frame_);
   const std::string how = !X_WB ? "timeout" : had_to_ ? "done after a while" : "done";
-  begin();
+  Planned::begin();
   ++outcomes_["waiting lookup " + how];
   world.trace("a waiting lookup of " + frame_ + ": " + how);
   next();

@@ -1,15 +1,14 @@
 #pragma once
 
 #include <cstddef>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
 
 #include "calls/waiting_lookup.hpp"
+#include "simulation/actor.hpp"
 #include "simulation/planned.hpp"
-#include "simulation/process.hpp"
 
 namespace tfdude::simulation {
 
@@ -17,25 +16,20 @@ namespace tfdude::simulation {
 /// their time is over. It attends to them as PendingLookups does: when the structure or the set of
 /// reachable partitions has changed, when replies have come, and when they say. It also removes the
 /// frame that a deputy has taken over.
-class Waiter final : public Planned,
+class Waiter final : public Actor,
+                     public Planned,
                      private LookupHost,
                      private ReplyListener,
-                     private RequestLink,
-                     public std::enable_shared_from_this<Waiter> {
+                     private RequestLink {
  public:
-  /// @param actor  the number by which its operations are counted
-  Waiter(std::shared_ptr<Process> process, std::size_t actor);
+  Waiter(std::shared_ptr<Process> process, std::size_t actor, std::size_t owners);
 
   /// Goes on until stop(); a lookup that waits then goes on waiting.
-  void start();
-  void stop() { stopped_ = true; }
-
-  [[nodiscard]] Process& process() { return *process_; }
-  [[nodiscard]] const std::map<std::string, std::size_t>& outcomes() const { return outcomes_; }
+  void start() override;
 
  private:
-  void next();
-  void step();
+  void step() override;
+  [[nodiscard]] std::string title() const override { return name(); }
   [[nodiscard]] bool may_remove() const;
   void remove();
   void wait(Error last);
@@ -65,10 +59,7 @@ class Waiter final : public Planned,
   [[nodiscard]] std::string name() const override { return "a lookup of " + frame_; }
   void renew() override;
 
-  std::shared_ptr<Process> process_;
-  const std::size_t actor_;
-  testing::Random random_;  // of the current step
-  std::size_t base_ = 0;    // whose frame is looked up
+  std::size_t base_ = 0;  // whose frame is looked up
   std::string frame_;
   bool had_to_ = false;
   std::optional<TimeLimit> limit_;
@@ -76,9 +67,6 @@ class Waiter final : public Planned,
   TimeLimit::Clock::time_point wakes_{};   // by the newest of its timers
   std::uint64_t told_ = 0;                 // how often something has changed
   std::set<std::uint32_t> sent_;           // the numbers of its requests
-  std::size_t steps_ = 0;
-  std::map<std::string, std::size_t> outcomes_;
-  bool stopped_ = false;
 };
 
 }  // namespace tfdude::simulation

@@ -61,13 +61,13 @@ class World {
 
   Run run() {
     daemons_.start();
-    for (std::size_t i = 0; i < plan_.clients; ++i) start(cast_.authors, i);
-    for (std::size_t i = 0; i < plan_.followers; ++i) start(cast_.followers, i);
-    for (std::size_t i = 0; i < plan_.samplers; ++i) start(cast_.samplers, i);
-    for (std::size_t i = 0; i < plan_.waiters; ++i) start_waiter();
+    for (std::size_t i = 0; i < plan_.clients; ++i) cast_.authors.push_back(start<Author>(i));
+    for (std::size_t i = 0; i < plan_.followers; ++i) cast_.followers.push_back(start<Follower>(i));
+    for (std::size_t i = 0; i < plan_.samplers; ++i) cast_.samplers.push_back(start<Sampler>(i));
+    for (std::size_t i = 0; i < plan_.waiters; ++i) start<Waiter>();
     for (std::size_t i = 0; i < plan_.streamers; ++i) start_streamer();
-    for (std::size_t i = 0; i < plan_.measurers; ++i) start(cast_.measurers, i);
-    for (std::size_t i = 0; i < plan_.pacers; ++i) start(cast_.pacers, i);
+    for (std::size_t i = 0; i < plan_.measurers; ++i) start<Measurer>(i);
+    for (std::size_t i = 0; i < plan_.pacers; ++i) start<Pacer>(i);
     for (const auto* faults : {&plan_.faults, &plan_.beside}) {
       for (const Fault& fault : *faults) {
         timeline_.at(fault.begin, {"fault"}, [this, &fault] { daemons_.begin(fault); });
@@ -75,12 +75,7 @@ class World {
       }
     }
     advance(plan_.storm);
-    for (const auto& author : cast_.authors) author->stop();
-    for (const auto& follower : cast_.followers) follower->stop();
-    for (const auto& sampler : cast_.samplers) sampler->stop();
-    for (const auto& waiter : cast_.waiters) waiter->stop();
-    for (const auto& measurer : cast_.measurers) measurer->stop();
-    for (const auto& pacer : cast_.pacers) pacer->stop();
+    for (const auto& actor : cast_.actors) actor->stop();
     network_.set_loss(plan_.loss_after);
     for (const Fault& fault : plan_.lasting) daemons_.begin(fault);
     if (plan_.forgets) {
@@ -97,12 +92,9 @@ class World {
     if (const Process* replaced = daemons_.replaced()) {
       violation("one that was replaced serves on", replaced->partition());
     }
-    for (const auto& author : cast_.authors) add_outcomes(*author);
-    for (const auto& follower : cast_.followers) add_outcomes(*follower);
-    for (const auto& sampler : cast_.samplers) add_outcomes(*sampler);
-    for (const auto& waiter : cast_.waiters) add_outcomes(*waiter);
-    for (const auto& measurer : cast_.measurers) add_outcomes(*measurer);
-    for (const auto& pacer : cast_.pacers) add_outcomes(*pacer);
+    for (const auto& actor : cast_.actors) {
+      for (const auto& [what, count] : actor->outcomes()) run_.counts[what] += count;
+    }
     run_.duration = timeline_.now();
     return std::move(run_);
   }
@@ -149,17 +141,8 @@ class World {
   // How many frames anybody has tried to add, including those of the configurations.
   [[nodiscard]] std::size_t frames_named() const {
     std::size_t named = 2 + 3 * plan_.owners + kContested + 2 * plan_.clients;
-    for (const auto& author : cast_.authors) named += author->added();
-    for (const auto& follower : cast_.followers) named += follower->added();
-    for (const auto& sampler : cast_.samplers) named += sampler->added();
-    for (const auto& measurer : cast_.measurers) named += measurer->added();
-    for (const auto& pacer : cast_.pacers) named += pacer->added();
+    for (const auto& actor : cast_.actors) named += actor->added();
     return named;
-  }
-
-  template <class Actor>
-  void add_outcomes(const Actor& actor) {
-    for (const auto& [what, count] : actor.outcomes()) run_.counts[what] += count;
   }
 
   void forget_who_is_lost() {
@@ -181,15 +164,12 @@ class World {
     return process;
   }
 
-  template <class Actor>
-  void start(std::vector<std::shared_ptr<Actor>>& actors, std::size_t number) {
-    actors.push_back(std::make_shared<Actor>(start_client(), number, actors_++, cast_.wild));
-    actors.back()->start();
-  }
-
-  void start_waiter() {
-    cast_.waiters.push_back(std::make_shared<Waiter>(start_client(), actors_++));
-    cast_.waiters.back()->start();
+  template <class One, class... Numbers>
+  std::shared_ptr<One> start(Numbers... numbers) {
+    auto one = std::make_shared<One>(start_client(), numbers..., cast_.actors.size(), cast_.wild);
+    cast_.actors.push_back(one);
+    one->start();
+    return one;
   }
 
   void start_streamer() {
@@ -214,7 +194,6 @@ class World {
   std::vector<Clock> clocks_;  // by computer
   Daemons daemons_;
   std::size_t clients_ = 0;
-  std::size_t actors_ = 0;
 };
 
 }  // namespace

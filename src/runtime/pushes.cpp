@@ -1,4 +1,4 @@
-#include "runtime/push_loop.hpp"
+#include "runtime/pushes.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -7,22 +7,13 @@
 
 namespace tfdude {
 
-PushLoop::PushLoop(Loop& loop, Forest& forest, std::size_t max_groups, Sink& sink)
-    : forest_(forest),
-      max_groups_(max_groups),
-      sink_(sink),
-      pushes_(loop, [this] { return run(); }) {}
-
-void PushLoop::stop() {
-  {
-    const Lock lock(mutex_);
-    stopped_ = true;
-    forest_.on_commit(nullptr);
-  }
-  pushes_.stop();
+void Pushes::stop() {
+  const Lock lock(mutex_);
+  stopped_ = true;
+  forest_.on_commit(nullptr);
 }
 
-Result<PushedValues> PushLoop::watch(std::uint64_t group, const WatchRequest& request) {
+Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& request) {
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   Result<PushedValues> snapshot;
   {
@@ -35,40 +26,39 @@ Result<PushedValues> PushLoop::watch(std::uint64_t group, const WatchRequest& re
         return fail(Errc::kTooMuch, "there are " + std::to_string(groups_.size()) +
                                         " groups of watchers with different paths, the limit");
       }
-      known = groups_.emplace(group, Group{WatchedGroup(group, request), {}, Clock::now(), false})
-                  .first;
+      known =
+          groups_.emplace(group, Group{WatchedGroup(group, request), {}, sink_.now(), false}).first;
     }
     snapshot = known->second.watched.snapshot(forest_, request.from);
     if (!snapshot) {
       end(known);
     } else {
-      known->second.lease = Clock::now() + kWatchLease;
+      known->second.lease = sink_.now() + kWatchLease;
     }
-    if (first && !groups_.empty() && !stopped_) forest_.on_commit([this] { pushes_.ask(); });
+    if (first && !groups_.empty() && !stopped_) forest_.on_commit([this] { sink_.wake(); });
   }
-  pushes_.ask();
+  sink_.wake();
   return snapshot;
 }
 
-void PushLoop::tell_all(std::uint64_t group) {
+void Pushes::tell_all(std::uint64_t group) {
   {
     const Lock lock(mutex_);
     const auto known = groups_.find(group);
     if (known == groups_.end()) return;
     known->second.all = true;
   }
-  pushes_.ask();
+  sink_.wake();
 }
 
 // The thread reports the end, as it may still be pushing to the group.
-void PushLoop::end(std::map<std::uint64_t, Group>::iterator& group) {
+void Pushes::end(std::map<std::uint64_t, Group>::iterator& group) {
   ended_.push_back(group->first);
   group = groups_.erase(group);
 }
 
-std::vector<PushedValues> PushLoop::take_due(Clock::time_point now,
-                                             std::vector<std::uint64_t>& ended,
-                                             Clock::time_point& next) {
+std::vector<PushedValues> Pushes::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
+                                           Clock::time_point& next) {
   std::vector<PushedValues> due;
   const Lock lock(mutex_);
   for (auto group = groups_.begin(); group != groups_.end();) {
@@ -106,10 +96,10 @@ std::vector<PushedValues> PushLoop::take_due(Clock::time_point now,
   return due;
 }
 
-PushLoop::Clock::time_point PushLoop::run() {
-  auto next = Loop::kNever;
+Pushes::Clock::time_point Pushes::run() {
+  auto next = kNever;
   std::vector<std::uint64_t> ended;
-  for (PushedValues& pushed : take_due(Clock::now(), ended, next)) {
+  for (PushedValues& pushed : take_due(sink_.now(), ended, next)) {
     for (const PushedValues& piece : pieces_of(std::move(pushed))) sink_.push(piece);
   }
   for (const std::uint64_t group : ended) sink_.end(group);

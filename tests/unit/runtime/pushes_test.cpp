@@ -1,4 +1,4 @@
-#include "runtime/push_loop.hpp"
+#include "runtime/pushes.hpp"
 
 #include <chrono>
 #include <map>
@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/loop.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/process.hpp"
@@ -27,7 +28,7 @@ const PathEnds kArm{"base", "arm"};
 const PathEnds kHand{"arm", "hand"};
 
 // An owner of two frames, and all that it pushed.
-struct PushingOwner final : PushLoop::Sink {
+struct PushingOwner final : Pushes::Sink {
   PushingOwner() {
     REQUIRE(forest.add("base", "", along_x(0)));
     REQUIRE(forest.add("arm", "base", along_x(0)));
@@ -55,13 +56,16 @@ struct PushingOwner final : PushLoop::Sink {
     const std::lock_guard lock(mutex);
     open.erase(group);
   }
+  void wake() override { job.ask(); }
+  ~PushingOwner() override { pusher.stop(); }
   Loop loop{"push"};
-  PushLoop pusher{loop, forest, 1000, *this};
+  Pushes pusher{forest, 1000, *this};
+  Loop::Job job{loop, [this] { return pusher.run(); }};
 };
 
 }  // namespace
 
-TEST_CASE("push loop: every sample of a watched edge is pushed and nothing of other edges") {
+TEST_CASE("pushes: every sample of a watched edge is pushed and nothing of other edges") {
   PushingOwner owner;
   for (int t = 1; t <= 100; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));
   REQUIRE(owner.pusher.watch(1, {{kHand}}));
@@ -81,7 +85,7 @@ TEST_CASE("push loop: every sample of a watched edge is pushed and nothing of ot
   CHECK(owner.count(1) == 101);
 }
 
-TEST_CASE("push loop: a group is pushed no faster than its rate and ends with the newest sample") {
+TEST_CASE("pushes: a group is pushed no faster than its rate and ends with the newest sample") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kHand}, false, 50ms}));
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
@@ -99,7 +103,7 @@ TEST_CASE("push loop: a group is pushed no faster than its rate and ends with th
   CHECK(owner.count(1) <= static_cast<std::size_t>(over / 50ms) + 3);
 }
 
-TEST_CASE("push loop: a watch of an edge that is not owned is rejected and opens no group") {
+TEST_CASE("pushes: a watch of an edge that is not owned is rejected and opens no group") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{{"arm", "nobody"}}})) == "not_owner");
   REQUIRE(owner.forest.update("hand", along_x(1), ms(1)));
@@ -108,7 +112,7 @@ TEST_CASE("push loop: a watch of an edge that is not owned is rejected and opens
   CHECK(owner.count(1) == 0);
 }
 
-TEST_CASE("push loop: a group ends with its frame even while it is being pushed to") {
+TEST_CASE("pushes: a group ends with its frame even while it is being pushed to") {
   PushingOwner owner;
   for (int i = 0; i < 100; ++i) {
     REQUIRE(owner.pusher.watch(1, {{kHand}}));
@@ -120,7 +124,7 @@ TEST_CASE("push loop: a group ends with its frame even while it is being pushed 
   }
 }
 
-TEST_CASE("push loop: no writer is left of a thousand groups that nobody renews") {
+TEST_CASE("pushes: no writer is left of a thousand groups that nobody renews") {
   PushingOwner owner;
   for (std::uint64_t group = 1; group <= 1000; ++group) {
     REQUIRE(owner.pusher.watch(group, {{kHand}}));
@@ -129,7 +133,7 @@ TEST_CASE("push loop: no writer is left of a thousand groups that nobody renews"
   REQUIRE(eventually([&] { return owner.writers().empty(); }));
 }
 
-TEST_CASE("push loop: a watcher that matches late gets all values again") {
+TEST_CASE("pushes: a watcher that matches late gets all values again") {
   PushingOwner owner;
   REQUIRE(owner.pusher.watch(1, {{kArm, kHand}}));
   REQUIRE(eventually([&] { return owner.count(1) == 2; }));
@@ -139,7 +143,7 @@ TEST_CASE("push loop: a watcher that matches late gets all values again") {
   CHECK(owner.count(2) == 0);
 }
 
-TEST_CASE("push loop: a period above the maximum is rejected") {
+TEST_CASE("pushes: a period above the maximum is rejected") {
   PushingOwner owner;
   CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, std::chrono::nanoseconds::max()})) ==
         "invalid_input");

@@ -1,40 +1,44 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <vector>
 
-#include "base/loop.hpp"
 #include "base/mutex.hpp"
 #include "partition/watching.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude {
 
-/// Pushes values written to an owner's edges to their watchers, as a job of a loop. The job sleeps
-/// while nobody watches: an update then costs one additional check of a pointer.
-class PushLoop {
+/// Pushes values written to an owner's edges to their watchers, in runs. While nobody watches, an
+/// update costs one additional check of a pointer.
+/// @par Thread safety  All functions are thread-safe; run() is for one thread.
+class Pushes {
  public:
-  using Clock = Loop::Clock;
+  using Clock = std::chrono::steady_clock;
+  static constexpr Clock::time_point kNever = Clock::time_point::max();
 
-  /// Where values go. Called by the loop, without a lock.
+  /// Where values go, and who runs it.
   class Sink {
    public:
     virtual ~Sink() = default;
+    /// Called by run(), without a lock.
     /// @param values  or a piece of them
     virtual void push(const PushedValues& values) = 0;
-    /// Frees the resources of pushing to a group.
+    /// Frees the resources of pushing to a group. Called as push().
     virtual void end(std::uint64_t group) = 0;
+    /// run() must follow soon. Called also with the lock of the forest.
+    virtual void wake() = 0;
+    [[nodiscard]] virtual Clock::time_point now() const { return Clock::now(); }
   };
 
   /// @param max_groups  watch() rejects further ones with kTooMuch
-  PushLoop(Loop& loop, Forest& forest, std::size_t max_groups, Sink& sink);
-  ~PushLoop() { stop(); }
-  PushLoop(const PushLoop&) = delete;
-  PushLoop& operator=(const PushLoop&) = delete;
+  Pushes(Forest& forest, std::size_t max_groups, Sink& sink)
+      : forest_(forest), max_groups_(max_groups), sink_(sink) {}
 
-  /// Ends pushing. Later watch requests are still answered.
+  /// Values are no longer noticed. Later watch requests are still answered.
   void stop();
 
   /// Starts to push to a group, or renews its lease. @return all current values; kNotOwner,
@@ -47,6 +51,10 @@ class PushLoop {
   /// Pushes all values to a group: a watcher has only now been matched.
   void tell_all(std::uint64_t group);
 
+  /// Pushes what was written since the last run, and ends groups that are not renewed. @return when
+  /// to run again, unless woken before
+  [[nodiscard]] Clock::time_point run();
+
  private:
   struct Group {
     WatchedGroup watched;
@@ -55,7 +63,6 @@ class PushLoop {
     bool all = false;  // must be sent completely once more
   };
 
-  [[nodiscard]] Clock::time_point run();
   void end(std::map<std::uint64_t, Group>::iterator& group) TFDUDE_REQUIRES(mutex_);
   /// The values to send now.
   /// @param next  gets the time when there may be more without another commit
@@ -71,7 +78,6 @@ class PushLoop {
   std::map<std::uint64_t, Group> groups_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<std::uint64_t> ended_ TFDUDE_GUARDED_BY(mutex_);  // whose end is not reported yet
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
-  Loop::Job pushes_;  // last: it uses the other members
 };
 
 }  // namespace tfdude
