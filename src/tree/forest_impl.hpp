@@ -129,8 +129,8 @@ class Forest::Impl {
   /// Pushes a value of one edge. @return whether it is new here
   bool push_told(const HeldVersion& edge, const PushedValue& value, bool replace)
       TFDUDE_REQUIRES(mutex_);
-  bool push_told_sample(const HeldVersion& edge, const Transform& X_PC, std::int64_t stamp,
-                        bool replace) TFDUDE_REQUIRES(mutex_);
+  bool push_told_sample(const HeldVersion& edge, const PushedValue& told, bool replace)
+      TFDUDE_REQUIRES(mutex_);
   void begin_told_history(std::uint32_t slot, const PushedValue& value) TFDUDE_REQUIRES(mutex_);
 
   // Correlations (forest_correlation.cpp).

@@ -1,8 +1,22 @@
+#include <algorithm>
+
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
 // Applies values from another forest.
 namespace tfdude {
+namespace {
+
+// What is said of a dynamic edge, without what an observation has found about one sample of it.
+Correlation said_in(const PushedValue& value) {
+  Correlation said = value.correlation;
+  if (!value.stamp) return said;
+  auto& all = said.common_errors;
+  all.erase(std::remove_if(all.begin(), all.end(), is_observed), all.end());
+  return said;
+}
+
+}  // namespace
 
 // The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
@@ -15,19 +29,27 @@ void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& val
   fresh.samples = new SampleHistory(timing);
 }
 
-bool Forest::Impl::push_told_sample(const HeldVersion& edge, const Transform& X_PC,
-                                    std::int64_t stamp, bool replace) {
+bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& told,
+                                    bool replace) {
+  const std::int64_t stamp = nanoseconds(*told.stamp);
   if (stamp < 0) return false;
+  const auto& common_errors = told.correlation.common_errors;
+  const bool observed = std::any_of(common_errors.begin(), common_errors.end(), is_observed);
+  const SampleRevision revision{told.X, observed ? told.correlation : Correlation()};
+  const GivenValue value{told.X, nullptr, observed ? &revision : nullptr};
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
-      if (!replace || same(edge.samples->sample(place)->value(), X_PC)) return false;
-      replace_sample(edge, {X_PC}, stamp);
+      if (!replace || same(edge.samples->sample(place)->value(), told.X)) return false;
+      replace_sample(edge, value, stamp);
+      if (observed) show_revision(edge.slot);
       return true;
     }
     if (!check_sample(edge, stamp)) return false;
   }
-  push_value(edge.slot, {X_PC}, stamp);
+  const std::uint32_t slot = edge.slot;
+  push_value(slot, value, stamp);
+  if (observed) show_revision(slot);
   return true;
 }
 
@@ -49,8 +71,7 @@ bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, 
     return true;
   }
   if (value.stamp) {
-    const bool taken =
-        push_told_sample(frames_.newest_value(slot), value.X, nanoseconds(*value.stamp), replace);
+    const bool taken = push_told_sample(frames_.newest_value(slot), value, replace);
     const HeldVersion& newest = frames_.newest_value(slot);
     if (value.made_up && newest.moving() && newest.stamp == nanoseconds(*value.stamp)) {
       mark_made_up(slot);
@@ -75,18 +96,20 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
   bool changed = false;
   for (const PushedValue& value : values) {
     const HeldVersion* edge = edge_of(value);
+    if (!check_common_errors(value.correlation.common_errors)) continue;
     if (edge != nullptr && impl_->push_told(*edge, value, replace)) changed = true;
   }
   std::vector<bool> correlated(edges.size(), false);
   for (auto value = values.rbegin(); value != values.rend(); ++value) {
     const HeldVersion* edge = edge_of(*value);
     if (edge == nullptr || correlated[value->index]) continue;
+    if (!check_common_errors(value->correlation.common_errors)) continue;
     correlated[value->index] = true;
     const Correlation before =
-        edge->correlation != nullptr ? edge->correlation->now : Correlation();
-    if (before == value->correlation || !check_common_errors(value->correlation.common_errors))
-      continue;
-    impl_->say_correlation(edge->slot, value->correlation);
+        edge->correlation != nullptr ? edge->correlation->said : Correlation();
+    const Correlation said = said_in(*value);
+    if (before == said) continue;
+    impl_->say_correlation(edge->slot, said);
     changed = true;
   }
   if (changed) impl_->commit();
