@@ -85,15 +85,21 @@ std::string describe(const Transform& X_AB, const Shown& shown,
   const auto s = stddev_in_parent(X_AB);
   const bool complete = X_AB.covariance.complete();
   if (!complete) text += "std dev      " + unspecified_text(unspecified) + "\n";
-  text += format("%s%.6f  %.6f  %.6f  m    %s\n", complete ? "std dev      " : "  of others  ",
-                 s[0], s[1], s[2], kAxesOfTranslation);
-  text +=
-      "             " + angles_text(s[3], s[4], s[5], shown.angles) + "  " + kAxesOfRotation + "\n";
+  const std::string along = format("%s%.6f  %.6f  %.6f  m",
+                                   complete ? "std dev      " : "  of others  ", s[0], s[1], s[2]);
+  const std::string about = angles_text(s[3], s[4], s[5], shown.angles);
+  const std::string margin(13, ' ');
+  if (along.size() + 3 + about.size() <= 80) {
+    text +=
+        along + "   " + about + "\n" + margin + kAxesOfTranslation + ", " + kAxesOfRotation + "\n";
+  } else {
+    text +=
+        along + "  " + kAxesOfTranslation + "\n" + margin + about + "  " + kAxesOfRotation + "\n";
+  }
   if (!shown.covariance) return text;
-  text += std::string("covariance   ") +
-          (complete ? "(right perturbation, translation first, "
-                    : "of the others (translation first, ") +
-          "in the axes of B; m, " + shown.angles.name + ")\n";
+  text += complete ? "covariance   (translation first, of the right perturbation; m, "
+                   : "covariance   of the others (translation first; m, ";
+  text += shown.angles.name + std::string(") in B's axes\n");
   return text + matrix_table(X_AB.covariance.of_specified().matrix(), shown.angles);
 }
 

@@ -55,7 +55,7 @@ std::vector<std::string> assumed_joints(Source source, const std::string& a, con
 nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
   const auto path = source.path(a, b).value_or(std::vector<PathSegment>());
   auto object = lookup_json(a, b, X_AB, path);
-  object["assumed_joints"] = assumed_joints(source, a, b, X_AB.basis.unspecified);
+  object["unsampled_joints"] = assumed_joints(source, a, b, X_AB.basis.unspecified);
   if (matrix) object["matrix"] = matrix_json(X_AB.pose.matrix());
   return object;
 }

@@ -96,7 +96,7 @@ class Browser(unittest.TestCase):
         rig.eventually(clicked, "a row of the list")
         self.assertEqual(browser.execute_script("return tfdude.inspector.a.value"), "world")
         self.answer(browser)
-        joints = robot.ask("lookup", "world", "tool0")["assumed_joints"]
+        joints = robot.ask("lookup", "world", "tool0")["unsampled_joints"]
         self.assertEqual(len(joints), 6)
         text = "return document.getElementById('inspector').innerText"
         note = f"6 joints have had no sample: {', '.join(joints)}."

@@ -89,10 +89,8 @@ struct PlotCommand final : Question {
     plot->samples = samples;
     plot->angles = common.angles;
     plot->assumed = assumed_joints(source, path.a, path.b, X_AB->basis.unspecified);
-    nlohmann::json json{{"from", path.a},
-                        {"to", path.b},
-                        {"frames", plot->frames},
-                        {"assumed_joints", plot->assumed}};
+    nlohmann::json json{{"from", path.a}, {"to", path.b}, {"frames", plot->frames}};
+    if (!plot->assumed.empty()) json["unsampled_joints"] = plot->assumed;
     if (samples > 0) {
       json["samples"] = samples;
       json["seed"] = kSampleSeed;

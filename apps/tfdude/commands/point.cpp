@@ -61,7 +61,7 @@ struct PointCommand final : Question {
     add_stamp(json, X_AB->stamp);
     json["basis"] = basis_json(X_AB->basis);
     const auto assumed = assumed_joints(source, path.a, path.b, X_AB->basis.unspecified);
-    json["assumed_joints"] = assumed;
+    json["unsampled_joints"] = assumed;
     if (joint) {
       const Eigen::MatrixXd together = joint_covariance(*X_AB, *p_B, query.order);
       const bool complete = X_AB->covariance.complete();

@@ -73,20 +73,21 @@ TEST_CASE("a transform is printed in metres and radians unless degrees are asked
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          0.174533  -0.349066  1.570796  rad",
-            "std dev      0.020373  0.013850  0.028162  m    along the axes of A",
-            "             0.017453  0.034907  0.052360  rad  about the axes of B"});
+            "std dev      0.020373  0.013850  0.028162  m   0.017453  0.034907  0.052360  rad",
+            "             along the axes of A, about the axes of B"});
 }
 
 TEST_CASE("deviations stand beside the coordinates that they are of") {
   // Turned by 90 degrees about z: B's x is A's y.
   const Transform X{*Pose::create({std::sqrt(0.5), 0, 0, std::sqrt(0.5)}, {1, 2, 0}),
                     *Covariance::from_stddev({0.001, 0.1, 0.002, 0.01, 0.02, 0})};
-  CHECK_THAT(
-      describe(X, {kRadian, true, false}),
-      ContainsSubstring("std dev      0.100000  0.001000  0.002000  m    along the axes of A\n"
-                        "             0.010000  0.020000  0.000000  rad  about the axes of B\n"
-                        "covariance   ") &&
-          ContainsSubstring("in the axes of B"));
+  CHECK_THAT(describe(X, {kRadian, true, false}),
+             ContainsSubstring(
+                 "std dev      0.100000  0.001000  0.002000  m   0.010000  0.020000  0.000000  "
+                 "rad\n"
+                 "             along the axes of A, about the axes of B\n"
+                 "covariance   ") &&
+                 ContainsSubstring(" in B's axes\n"));
   CHECK_THAT(
       echo_lines("map", "hand", {X, {}, {}}, {}, kRadian),
       ContainsSubstring("    0.100000     0.001000     0.002000 m   along the axes of A\n") &&
@@ -154,8 +155,8 @@ TEST_CASE("a transform is printed in degrees") {
             "translation  1.000000  -2.000000  3.000000  m",
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          10.0000  -20.0000  90.0000  deg",
-            "std dev      0.020373  0.013850  0.028162  m    along the axes of A",
-            "             1.0000  2.0000  3.0000  deg  about the axes of B"});
+            "std dev      0.020373  0.013850  0.028162  m   1.0000  2.0000  3.0000  deg",
+            "             along the axes of A, about the axes of B"});
 }
 
 TEST_CASE("a covariance is printed as a matrix if asked for") {
@@ -187,8 +188,8 @@ TEST_CASE("a covariance that is not complete is printed as that of the other edg
             "quaternion   0.183013  -0.061628  0.704416  0.683013  (x y z w)",
             "rpy          10.0000  -20.0000  90.0000  deg",
             "std dev      unspecified for odom, a\\x0ab",
-            "  of others  0.020373  0.013850  0.028162  m    along the axes of A",
-            "             1.0000  2.0000  3.0000  deg  about the axes of B"});
+            "  of others  0.020373  0.013850  0.028162  m   1.0000  2.0000  3.0000  deg",
+            "             along the axes of A, about the axes of B"});
   const std::string text = describe(X, in_degrees(true), {"odom"});
   CHECK(text.find("covariance   of the others") != std::string::npos);
 }
