@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -222,6 +223,74 @@ Loading own_seen(const JointPrior& prior, std::size_t i, const Matrix6d& H, cons
   return prior.own_roots()[i] * (factor.whitening() * on_path).transpose();
 }
 
+// Correlates an edge with the others of the path by e = c - K y, where c is independent of all and
+// y = Σ H e of the others.
+// @param H  that of the edge is zero
+// @param Y  a root of the covariance of y; W Y with the others' W
+void couple(const JointPrior& prior, const std::vector<Matrix6d>& H, const Factor& others,
+            std::size_t edge, const Matrix6d& K, const Loading& Y, const Eigen::MatrixXd& WY,
+            JointCovariance& observed) {
+  std::vector<Loading> less(std::max(prior.edges().size(), edge + 1),
+                            Loading::Zero(6, others.root().cols()));
+  for (std::size_t i = 0; i < prior.edges().size(); ++i) {
+    less[i] = own_seen(prior, i, H[prior.edges()[i]], others);
+  }
+  std::vector<Loading> more;
+  for (const Loading& one : less) more.emplace_back(one * WY);
+  more[edge] = -K * Y;
+  observed.append(less, true);
+  observed.append(more, false);
+}
+
+// How many times the variance that the path keeps was in those columns.
+double lost(const Factor& kept, const Loading& columns) {
+  return (kept.whitening() * columns).squaredNorm();
+}
+
+// The edge that makes nearly all of the path's error, if so much of that is taken away that the
+// difference would lose its digits, as over a long lever.
+std::optional<std::size_t> dominant(const JointPrior& prior, const std::vector<Matrix6d>& H,
+                                    const Loading& R, const Factor& S) {
+  constexpr double kManyDigits = 1e10;
+  constexpr double kNearlyAll = 0.9;
+  if (!prior.sources().empty()) return std::nullopt;
+  const Loading path = prior.path(H);
+  const Factor kept(updated_root(path, path, R, S));
+  const double by_all = lost(kept, path);
+  if (by_all < kManyDigits) return std::nullopt;
+  for (std::size_t i = 0; i < prior.edges().size(); ++i) {
+    if (lost(kept, H[prior.edges()[i]] * prior.own_roots()[i]) > kNearlyAll * by_all) return i;
+  }
+  return std::nullopt;
+}
+
+// The others are corrected as by a measurement with the dominant edge's error, and this edge by the
+// measurement and them. What the path keeps is then a difference of what the others make of it.
+std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearPath& linear,
+                                          const Loading& R, std::size_t edge,
+                                          const std::string& new_source) {
+  const Twist rounding = rounding_of_pose(linear.reach);
+  const Loading& own = prior.own_roots()[edge];
+  const Matrix6d& H = linear.H[prior.edges()[edge]];
+  const Loading seen = H * own;
+  const Factor S(joined(seen, R), rounding);
+  const Matrix6d K = own_seen(prior, edge, H, S) * S.whitening();
+  const Loading rest = updated_root(own, seen, R, S);
+  std::vector<CorrectedError> corrected;
+  for (const Matrix6d& one : prior.own()) corrected.push_back({one, {}, false});
+  corrected[edge].own = rest * rest.transpose();
+  auto beside = linear.H;
+  beside[prior.edges()[edge]].setZero();
+  const Factor others(prior.own_on_path(beside));
+  const Loading noise = S.root();
+  const Loading Y = updated_root(others.root(), others.root(), noise,
+                                 Factor(joined(others.root(), noise), rounding));
+  JointCovariance observed(corrected.size());
+  couple(prior, beside, others, edge, K, Y, others.whitening() * Y, observed);
+  give(observed, corrected, new_source);
+  return corrected;
+}
+
 }  // namespace
 
 std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const LinearPath& linear,
@@ -254,6 +323,9 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
     carry(source, loadings, alone ? nullptr : &observed, corrected);
   }
   if (alone) return corrected;
+  if (const auto edge = dominant(prior, H, R, S)) {
+    return errors_beside(prior, linear, R, *edge, new_source);
+  }
   const Factor S_0(joined(prior.own_on_path(H), R), rounding);
   std::vector<Loading> less;
   std::vector<Loading> more;
@@ -271,7 +343,6 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
 std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size_t u,
                                               const LinearPath& linear, const Loading& R,
                                               const std::string& new_source) {
-  const auto& edges = prior.edges();
   const Matrix6d G = linear.H[u].inverse();
   std::vector<CorrectedError> determined;
   for (const Matrix6d& own : prior.own()) determined.push_back({own, {}, false});
@@ -285,14 +356,8 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
   }
   const Factor whole(prior.own_on_path(linear.H));
   if (whole.rank() > 0) {
-    std::vector<Loading> seen;
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      seen.push_back(own_seen(prior, i, linear.H[edges[i]], whole));
-    }
-    seen.emplace_back(-G * whole.root());
-    observed.append(seen, false);
-    seen.back().setZero();
-    observed.append(seen, true);
+    couple(prior, linear.H, whole, determined.size() - 1, G, whole.root(),
+           Matrix::Identity(whole.rank(), whole.rank()), observed);
   }
   forget_least(prior, observed, determined);
   if (!observed.empty()) give(observed, determined, new_source);

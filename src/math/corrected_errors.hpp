@@ -22,6 +22,10 @@ struct CorrectedError {
 /// S₀⁻¹ (K S₀ - N)ᵀ. This gives two common errors of the new source: one that subtracts and, if
 /// there were common errors, one that adds. Common errors from earlier observations are merged into
 /// them. If fewer columns say the same (low_rank.hpp), those are taken.
+///
+/// If one edge makes nearly all of the path's error, and the measurement is a hundred thousand
+/// times as precise, that difference would lose its digits. This edge is then tied to the others as
+/// in determined_errors(), with its gain instead of G.
 /// @param R  a root of the measurement's covariance
 [[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
                                                            const LinearPath& linear,
