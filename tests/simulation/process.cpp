@@ -45,7 +45,8 @@ Process::Process(Surroundings& world, Setting setting)
       directory_(forest_, setting_.partition),
       member_(forest_, directory_, setting_.partition),
       pushes_(forest_, SIZE_MAX, *this),
-      watches_(*this) {
+      watches_(*this),
+      commits_(*this, {}, setting_.disk != nullptr) {
   directory_.changes().watch();
 }
 
@@ -118,13 +119,12 @@ void Process::serve() {
                      partition() + " had stored epoch " + std::to_string(left->epoch) +
                          " and is served as " + std::to_string(member_.presence().incarnation));
   }
-  perform(take_ready());
+  perform(commits_.begin(now()));
   // A daemon that starts needs room on the disk, and ends if there is none.
-  if (failure_) return leave();
+  if (!commits_.started()) return leave();
   // Its first change is synced.
   if (setting_.disk != nullptr) setting_.disk->checkpoint();
   announce(member_.introduce());
-  if (setting_.disk != nullptr) later("values", kSaveValuesEvery, [this] { save_values(); });
   react();
 }
 
@@ -245,8 +245,9 @@ void Process::hear(std::uint64_t from, const Sample& sample) {
 void Process::react() {
   ++inputs_;
   const Outcome outcome = member_.take_outcome();
-  if (outcome.to_commit && serving_) ask_commit(kPublishEvery);
-  if (outcome.to_reply && serving_) ask_commit(Instant(0));
+  if (outcome.to_commit) (void)commits_.ask();
+  if (outcome.to_reply) commits_.hurry();
+  look_at_commits();
   if (outcome.to_yield && !std::exchange(yielding_, true)) {
     later("yield", kYieldEvery, [this] { yield(); });
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "calls/tasks.hpp"
 #include "partition/claiming.hpp"
 #include "partition/member.hpp"
+#include "runtime/commits.hpp"
 #include "runtime/pushes.hpp"
 #include "simulation/clock.hpp"
 #include "simulation/disk.hpp"
@@ -58,6 +60,7 @@ std::uint64_t process_of(const PeerId& peer);
 /// One process of a participant: the loops that it runs around its Member, in simulated time.
 class Process : public std::enable_shared_from_this<Process>,
                 public RequestLink,
+                private Commits::Effects,
                 private Pushes::Sink {
  public:
   /// What a life begins with.
@@ -174,9 +177,6 @@ class Process : public std::enable_shared_from_this<Process>,
   [[nodiscard]] std::vector<std::string> structure(const std::set<std::string>& except) const;
 
  private:
-  static constexpr Instant kPublishEvery = milliseconds(1);
-  static constexpr Instant kSaveValuesEvery = milliseconds(1000);
-
   struct Peer {
     std::optional<Presence> said;
     std::optional<Presence> by_page;
@@ -212,11 +212,15 @@ class Process : public std::enable_shared_from_this<Process>,
   void take_frames();
   void serve();
   [[nodiscard]] bool is_too_early(const Error& error) const;
-  [[nodiscard]] Ready take_ready();
-  void ask_commit(Instant wait);
+  void look_at_commits();
   void commit();
   void perform(const Ready& ready);
-  void save_values();
+  // Commits::Effects
+  [[nodiscard]] Ready take(bool values_due) override;
+  void publish(const Ready& ready) override;
+  void take_back(const Ready& ready) override;
+  void reply(const PendingReply& pending) override;
+
   void announce(const std::optional<Presence>& presence);
   void yield();
   [[nodiscard]] bool awaits_presence() const;
@@ -242,8 +246,9 @@ class Process : public std::enable_shared_from_this<Process>,
   Watches watches_;
   std::uint64_t pushed_ = 0;
   std::vector<std::function<void()>> backlog_;
-  std::vector<std::function<void(const Result<void>&)>> waiting_;
-  std::optional<Error> failure_;
+  Commits commits_;
+  Commits::Clock::time_point commit_at_ = Commits::kNever;
+  std::list<std::pair<std::uint64_t, std::function<void(const Result<void>&)>>> waiting_;
   Instant born_{};
   Instant looked_{};
   std::uint64_t looks_ = 0;
@@ -256,8 +261,6 @@ class Process : public std::enable_shared_from_this<Process>,
   bool ended_ = false;
   bool too_early_ = false;
   bool committing_ = false;
-  bool commit_asked_ = false;
-  bool values_due_ = false;
   bool yielding_ = false;
   bool looking_for_gone_ = false;
 };

@@ -20,7 +20,7 @@ void Process::on_request(std::uint64_t from, const Request& request) {
     return reply_to(from, member_.partition()->answer_lookup(request.sequence, *lookup));
   }
   if (std::holds_alternative<WatchRequest>(request.body)) return answer_watch(from, request);
-  const auto reply = member_.on_request(peer_of(from), request, failure_, wall());
+  const auto reply = member_.on_request(peer_of(from), request, commits_.failure(), wall());
   if (reply) reply_to(from, *reply);
   react();
 }
@@ -130,7 +130,7 @@ Reply Process::answer(const Request& request) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return member_.partition()->answer_lookup(request.sequence, *lookup);
   }
-  Reply reply = member_.answer(request, failure_, wall());
+  Reply reply = member_.answer(request, commits_.failure(), wall());
   world_.invariants.answered(*this, request, reply);
   react();
   return reply;
