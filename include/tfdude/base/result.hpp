@@ -50,7 +50,7 @@ enum class Errc : std::uint8_t {
 
 /// An error for people: the message names the frame, the partition and the value concerned.
 struct Error {
-  Errc code{};
+  Errc code;
   std::string message;
 };
 
