@@ -29,8 +29,8 @@ struct TransformParts {
 template <class Value>
 class PathAccumulation {
  public:
-  PathAccumulation() {
-  }  // NOLINT(*-member-init,*-use-equals-default): what is pending is written before it is read
+  // NOLINTNEXTLINE(*-member-init,*-use-equals-default): what is pending is written before it is read
+  PathAccumulation() {}
 
   /// Goes up one edge with value X_PC, from C, the frame reached so far, to P.
   void up(const Value& X_PC) {

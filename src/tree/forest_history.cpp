@@ -79,6 +79,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
     // Twice in one update: the later one counts, and no reader has seen the earlier.
     reclaimer_.samples().release(there->shared);
     newest.samples->rewrite(sample, place);
+    // NOLINTNEXTLINE(*-const-cast): only readers see it as constant
     if (newest.stamp == stamp) const_cast<HeldVersion&>(newest).X_PC = value.X_PC;
     return;
   }

@@ -41,7 +41,7 @@ HistoryInfo history_of(const HeldVersion& edge) {
   }
   info.newest = time_of(edge.stamp);
   if (info.samples < 2) return info;
-  const double gaps = static_cast<double>(info.samples - 1);
+  const auto gaps = static_cast<double>(info.samples - 1);
   const double mean = sum / gaps;
   info.mean_gap = std::chrono::nanoseconds(std::llround(mean));
   info.jitter = std::chrono::nanoseconds(

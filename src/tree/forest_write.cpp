@@ -39,7 +39,7 @@ Result<void> Forest::Impl::check_no_cycle(const Pair& pair) const {
 
 const Name* Forest::Impl::intern(std::string_view id) {
   if (free_slots_.empty()) {
-    Version* nobody = reclaimer_.take<Version>();
+    auto* nobody = reclaimer_.take<Version>();
     *nobody = Version{};
     free_slots_.push_back(frames_.add_slot(nobody));
   }

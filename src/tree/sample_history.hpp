@@ -61,7 +61,7 @@ class SampleHistory {
 
   /// Its memory, without samples.
   [[nodiscard]] std::size_t bytes() const {
-    return sizeof(SampleHistory) + (mask_ + 1) * sizeof(SampleChunk*);
+    return sizeof(SampleHistory) + (mask_ + 1) * sizeof(SampleChunk*);  // NOLINT(*-sizeof-*)
   }
   /// The memory of the samples up to this one. O(samples).
   [[nodiscard]] std::size_t bytes_until(std::uint64_t newest) const;

@@ -43,7 +43,7 @@ class SampleStore {
  private:
   // Only readers see it as constant.
   [[nodiscard]] static SharedPart& of_writer(const SharedPart* shared) {
-    return const_cast<SharedPart&>(*shared);
+    return const_cast<SharedPart&>(*shared);  // NOLINT(*-const-cast): see above
   }
   [[nodiscard]] const SharedPart* fresh_part(const GivenValue& value);
   void supersede(const SharedPart* shared);
