@@ -36,8 +36,8 @@ class SignedColumns {
   [[nodiscard]] bool empty() const { return columns_.cols() == 0; }
 
   // Writes the same sum with the fewest columns, as common errors of one source. Each row is scaled
-  // to one before, so that no edge and no unit is judged by another. All edges that share the source
-  // are here. Columns beyond the maximum that subtract may therefore be dropped.
+  // to one before, so that no edge and no unit is judged by another. All edges that share the
+  // source are here. Columns beyond the maximum that subtract may therefore be dropped.
   // Those that add go to the own parts: no correlation of n parts exceeds n times their sum.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
     const Eigen::VectorXd size = columns_.rowwise().norm();

@@ -22,7 +22,7 @@ struct CorrectedError {
 /// there were common errors, one that adds. Common errors from earlier observations are merged into
 /// them.
 ///
-/// If one edge makes nearly all of the path's error, and the measurement is a hundred thousand times
+/// If one edge makes nearly all of the path's error, and the measurement is 100,000 times
 /// as precise, that difference would lose its digits. This edge is then tied to the others as in
 /// determined_errors(), with its gain instead of G.
 /// @param R  a root of the measurement's covariance
@@ -31,9 +31,9 @@ struct CorrectedError {
                                                            const Loading& R,
                                                            const std::string& source);
 
-/// The same for a path with an edge u of which nothing was known, the limit of no prior information:
-/// the other edges keep their errors, and that of u is G (v - Σ H e), with G = H_u⁻¹, the error v of
-/// the measurement, and the errors e of the others. Let B be a root of Σ H own Hᵀ and W B = 1. Then
+/// The same for a path with an edge u of which nothing was known, the limit of no prior
+/// information: the other edges keep their errors, and that of u is G (v - Σ H e), with G = H_u⁻¹,
+/// the error v of the measurement, and the errors e of the others. Let B be a root of Σ H own Hᵀ and W B = 1. Then
 /// columns N Wᵀ of the others, with -G B of u, correlate them with u, and the same columns of the
 /// others, subtracted, keep these independent of each other.
 /// @param prior  of the other edges

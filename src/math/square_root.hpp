@@ -21,8 +21,8 @@ inline constexpr double kRoundingShare = 16 * std::numeric_limits<double>::epsil
 /// A root of the same covariance with at most six columns.
 [[nodiscard]] Loading compressed(const Loading& root);
 
-/// A root of C Cᵀ - D Dᵀ, which has no negative eigenvalue but by rounding. Each direction is judged
-/// in units of C's deviation there. None becomes less than rounding of it, as zero would claim to
+/// A root of C Cᵀ - D Dᵀ, which has no negative eigenvalue but by rounding. Each direction is
+/// judged in units of C's deviation there. None becomes less than rounding of it, as zero would claim to
 /// be exact.
 [[nodiscard]] Loading root_of_difference(const Loading& C, const Loading& D);
 
@@ -56,7 +56,8 @@ class Factor {
   Twist unit_;
 };
 
-/// A root of the covariance after a measurement, L Lᵀ - L Aᵀ S⁺ A Lᵀ with A = H L and S = A Aᵀ + R Rᵀ.
+/// A root of the covariance after a measurement, L Lᵀ - L Aᵀ S⁺ A Lᵀ with A = H L and
+/// S = A Aᵀ + R Rᵀ.
 /// By one orthogonal transformation, without a difference (the array form of the square-root
 /// filter; Kaminski, Bryson & Schmidt 1971).
 [[nodiscard]] Loading updated_root(const Loading& L, const Loading& A, const Loading& R,

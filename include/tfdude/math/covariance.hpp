@@ -33,8 +33,8 @@ class TFDUDE_EXPORT Covariance {
   ///   float32 or to seven digits causes them, are raised to zero. Each axis is scaled by its own
   ///   variance, but by no less than 1e-6 of the largest variance of its unit (m² or rad²). Values
   ///   below 1e-12 of that largest variance count as rounding. So the library's own results are
-  ///   usually accepted again. An exception cannot be detected here: if, over a lever, all values of
-  ///   one unit are rounding errors of the other.
+  ///   usually accepted again. An exception cannot be detected here: if, over a lever, all values
+  ///   of one unit are rounding errors of the other.
   [[nodiscard]] static Result<Covariance> from_upper(const Upper& upper);
 
   /// Independent errors along the six axes: three standard deviations [m], then three [rad].

@@ -312,8 +312,8 @@ TEST_CASE("axes of different size are distinguished down to rounding of the larg
 TEST_CASE("decimal rounding is accepted up to 1e-6 and rejected beyond") {
   // The tolerance: with every axis scaled to a variance of one, no eigenvalue below -1e-6 of the
   // largest. Rounding to d digits moves each element by up to 5·10^-d of it, an eigenvalue by up to
-  // 6 times that: eight digits always pass, four may well be rejected, and whatever passes comes out
-  // semi-definite.
+  // 6 times that: eight digits always pass, four may well be rejected, and whatever passes comes
+  // out semi-definite.
   Random random(112);
   INFO("seed " << random.seed());
   int accepted = 0;
