@@ -33,9 +33,9 @@ struct CorrectedError {
 
 /// The same for a path with an edge u of which nothing was known, the limit of no prior
 /// information: the other edges keep their errors, and that of u is G (v - Σ H e), with G = H_u⁻¹,
-/// the error v of the measurement, and the errors e of the others. Let B be a root of Σ H own Hᵀ and W B = 1. Then
-/// columns N Wᵀ of the others, with -G B of u, correlate them with u, and the same columns of the
-/// others, subtracted, keep these independent of each other.
+/// the error v of the measurement, and the errors e of the others. Let B be a root of Σ H own Hᵀ
+/// and W B = 1. Then columns N Wᵀ of the others, with -G B of u, correlate them with u, and the
+/// same columns of the others, subtracted, keep these independent of each other.
 /// @param prior  of the other edges
 /// @param u  the edge's index in the path
 /// @return one entry per uncertain edge of the prior, then that of u

@@ -22,8 +22,8 @@ inline constexpr double kRoundingShare = 16 * std::numeric_limits<double>::epsil
 [[nodiscard]] Loading compressed(const Loading& root);
 
 /// A root of C Cᵀ - D Dᵀ, which has no negative eigenvalue but by rounding. Each direction is
-/// judged in units of C's deviation there. None becomes less than rounding of it, as zero would claim to
-/// be exact.
+/// judged in units of C's deviation there. None becomes less than rounding of it, as zero would
+/// claim to be exact.
 [[nodiscard]] Loading root_of_difference(const Loading& C, const Loading& D);
 
 using Whitening = Eigen::Matrix<double, Eigen::Dynamic, 6>;
