@@ -25,16 +25,16 @@ class TFDUDE_EXPORT Covariance {
   /// Zero: known exactly.
   Covariance() = default;
 
-  /// @return kInvalidInput naming the element: NaN, infinity, not symmetric to 1e-6 of its axes'
+  /// @return kInvalidInput naming the element: NaN, infinity, not symmetric to 6e-6 of its axes'
   ///   standard deviations, not positive semi-definite, beyond kMaxVariance.
   [[nodiscard]] static Result<Covariance> from_matrix(const Matrix6d& matrix);
 
-  /// @return as from_matrix(). Negative eigenvalues within 1e-6 of the scaled matrix, as rounding
-  ///   to float32 or to seven decimals causes them, are raised to zero. Each axis is scaled by its
-  ///   own variance, but by no less than 1e-6 of the largest variance of its unit (m² or rad²).
-  ///   Values below 1e-12 of that largest variance count as rounding. So the library's own results
-  ///   are usually accepted again. An exception cannot be detected here: if, over a lever, all
-  ///   values of one unit are rounding errors of the other.
+  /// @return as from_matrix(). Negative eigenvalues up to 1e-6 of the largest, as rounding to
+  ///   float32 or to seven digits causes them, are raised to zero. Each axis is scaled by its own
+  ///   variance, but by no less than 1e-6 of the largest variance of its unit (m² or rad²). Values
+  ///   below 1e-12 of that largest variance count as rounding. So the library's own results are
+  ///   usually accepted again. An exception cannot be detected here: if, over a lever, all values
+  ///   of one unit are rounding errors of the other.
   [[nodiscard]] static Result<Covariance> from_upper(const Upper& upper);
 
   /// Independent errors along the six axes: three standard deviations [m], then three [rad].

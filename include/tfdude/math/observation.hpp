@@ -55,7 +55,9 @@ struct ObservedResult {
 };
 
 struct Observation {
-  /// Of the measurement from the estimate, squared Mahalanobis distance.
+  /// Of the measurement from the estimate, squared Mahalanobis distance: the least sum of squares
+  /// by which edges and measurement explain each other. Infinite if they contradict each other in a
+  /// direction that both know exactly.
   double distance_squared = 0;
   int dimensions = 0;                 ///< of that distance
   double limit = 0;                   ///< of the gate; infinite without a gate
@@ -66,7 +68,7 @@ struct Observation {
 /// Distributes a measurement of X_AB over the edges of the path from A to B. Finds the most
 /// probable perturbations ξᵢ of all edges at once, which minimize Σ ξᵀ P⁻¹ ξ + eᵀ R⁻¹ e with e =
 /// Log(Z⁻¹ X_AB(ξ)), by Gauss-Newton (an iterated Kalman update). P is the joint covariance of the
-/// edges' beliefs. Edges without uncertainty stay unchanged.
+/// edges' beliefs. Edges without uncertainty stay unchanged. The gate judges the sum there.
 ///
 /// The correlation between the edges afterwards is kept in common errors of a new source, which
 /// replaces those of earlier observations. So it is exact to first order for every path, and a
