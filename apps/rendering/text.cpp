@@ -36,6 +36,22 @@ std::string describe_pose(const Pose& X_AB, const Shown& shown) {
 
 bool is_prismatic(const JointInfo& joint) { return joint.type == JointType::kPrismatic; }
 
+// As many words as fit, at least one, and how many there are besides.
+std::string joined_within(const std::vector<std::string>& words, std::size_t columns) {
+  constexpr std::size_t kAndMore = 12;
+  const std::string all = joined(words);
+  if (all.size() <= columns) return printable(all);
+  std::vector<std::string> some{words.front()};
+  std::size_t size = words.front().size();
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    size += 2 + words[i].size();
+    if (size + kAndMore > columns) break;
+    some.push_back(words[i]);
+  }
+  const std::size_t more = words.size() - some.size();
+  return printable(joined(some)) + (more > 0 ? " and " + std::to_string(more) + " more" : "");
+}
+
 }  // namespace
 
 std::string joined(const std::vector<std::string>& words) {
@@ -46,14 +62,14 @@ std::string joined(const std::vector<std::string>& words) {
 
 std::string unspecified_text(const std::vector<std::string>& edges) {
   if (edges.empty()) return "unspecified";
-  return "unspecified for " + printable(joined(edges));
+  return "unspecified for " + joined_within(edges, 50);
 }
 
 std::string assumed_text(const std::vector<std::string>& joints) {
   if (joints.empty()) return {};
   return std::to_string(joints.size()) +
          (joints.size() == 1 ? " joint has had no sample: " : " joints have had no sample: ") +
-         printable(joined(joints));
+         joined_within(joints, 38);
 }
 
 std::string assumed_line(const std::vector<std::string>& joints) {

@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "calls/lookup_in_progress.hpp"
+#include "math/observe_beside.hpp"
 #include "partition/latest.hpp"
 
 namespace tfdude {
@@ -18,7 +19,7 @@ namespace {
 constexpr int kObserveAttempts = 8;
 
 // How often, and for how long, to wait for another observation to reach all owners.
-constexpr int kTornAttempts = 2;
+constexpr int kTornAttempts = 5;
 constexpr Milliseconds kTornPause{1};
 
 // Whether a value differs by more than rounding, in units of its error.
@@ -152,9 +153,13 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
     pause_ = kTornPause * (1 << torn_++);
     return Next::kPlan;
   }
-  const auto found =
-      tfdude::observe(path.edges, measurement_.X_AB, source_ + "." + std::to_string(attempts_),
-                      measurement_.options);
+  // What is left out may still be correlated with what is not, or will be in a moment.
+  absent_.clear();
+  std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
+  const std::string source = source_ + "." + std::to_string(attempts_);
+  const bool alone = absent_.empty() && !path.torn;
+  const auto found = (alone ? tfdude::observe : observe_beside_others)(
+      path.edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);
   return fail_at("the path from " + quote(measurement_.a) + " to " + quote(measurement_.b),
                  found.error());
@@ -173,7 +178,7 @@ Result<Task::Next> ObserveTask::apply(const ObservedPath& path, const Observatio
     }
     if (edge.forgotten) observed_.forgotten.push_back(id);
   }
-  shares_ = revisions(plan_, path, found);
+  shares_ = revisions(plan_, path, found, absent_);
   owners_ = shares_.size();
   applied_.clear();
   if (shares_.empty()) return Next::kDone;

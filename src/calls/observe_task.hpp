@@ -74,10 +74,11 @@ class ObserveTask final : public Task {
   std::vector<std::string> left_out_;  // edges that were, but cannot be corrected now
   ObservedPath path_;
   std::vector<Part> shares_;
-  std::vector<Part> later_;    // shares of all owners but the first
-  std::vector<Part> applied_;  // shares that owners have applied
-  std::size_t owners_ = 0;     // that have a share
-  Error refused_{};            // why another one has not
+  std::vector<Part> later_;          // shares of all owners but the first
+  std::vector<Part> applied_;        // shares that owners have applied
+  std::size_t owners_ = 0;           // that have a share
+  Error refused_{};                  // why another one has not
+  std::vector<std::string> absent_;  // edges beside the path that are left out, but still exist
   Observed observed_;
   int attempts_ = 0;
   int torn_ = 0;

@@ -294,7 +294,8 @@ std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearP
 }  // namespace
 
 std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const LinearPath& linear,
-                                             const Loading& R, const std::string& new_source) {
+                                             const Loading& R, const std::string& new_source,
+                                             bool merge) {
   const auto& edges = prior.edges();
   const auto& H = linear.H;
   const Twist rounding = rounding_of_pose(linear.reach);
@@ -320,7 +321,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
     const Loading on_path = source.on_path(prior, H);
     std::vector<Loading> loadings = source.loadings;
     for (std::size_t i = 0; i < edges.size(); ++i) loadings[i] -= gains[i] * on_path;
-    carry(source, loadings, alone ? nullptr : &observed, corrected);
+    carry(source, loadings, alone || !merge ? nullptr : &observed, corrected);
   }
   if (alone) return corrected;
   if (const auto edge = dominant(prior, H, R, S)) {
@@ -342,7 +343,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
 
 std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size_t u,
                                               const LinearPath& linear, const Loading& R,
-                                              const std::string& new_source) {
+                                              const std::string& new_source, bool merge) {
   const Matrix6d G = linear.H[u].inverse();
   std::vector<CorrectedError> determined;
   for (const Matrix6d& own : prior.own()) determined.push_back({own, {}, false});
@@ -352,7 +353,7 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
   for (const JointPrior::Source& source : prior.sources()) {
     std::vector<Loading> loadings = source.loadings;
     loadings.emplace_back(-G * source.on_path(prior, linear.H));
-    carry(source, loadings, &observed, determined);
+    carry(source, loadings, merge ? &observed : nullptr, determined);
   }
   const Factor whole(prior.own_on_path(linear.H));
   if (whole.rank() > 0) {

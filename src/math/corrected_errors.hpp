@@ -27,10 +27,11 @@ struct CorrectedError {
 /// times as precise, that difference would lose its digits. This edge is then tied to the others as
 /// in determined_errors(), with its gain instead of G.
 /// @param R  a root of the measurement's covariance
+/// @param merge  false: other edges depend on the sources of earlier observations, which are kept
 [[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
                                                            const LinearPath& linear,
                                                            const Loading& R,
-                                                           const std::string& source);
+                                                           const std::string& source, bool merge);
 
 /// The same for a path with an edge u of which nothing was known, the limit of no prior
 /// information: the other edges keep their errors, and that of u is G (v - Σ H e), with G = H_u⁻¹,
@@ -43,6 +44,6 @@ struct CorrectedError {
 [[nodiscard]] std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size_t u,
                                                             const LinearPath& linear,
                                                             const Loading& R,
-                                                            const std::string& source);
+                                                            const std::string& source, bool merge);
 
 }  // namespace tfdude

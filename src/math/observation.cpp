@@ -16,6 +16,7 @@
 #include "math/bound_weights.hpp"
 #include "math/corrected_errors.hpp"
 #include "math/minimum.hpp"
+#include "math/observe_beside.hpp"
 #include "math/path_minimum.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
@@ -31,14 +32,15 @@ Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
 class Update {
  public:
   Update(const std::vector<ObservedEdge>& edges, const Transform& Z_AB, const std::string& source,
-         const ObserveOptions& options)
+         const ObserveOptions& options, bool merge)
       : all_(edges),
         Z_AB_(Z_AB),
         source_(source),
         options_(options),
         prior_(edges),
         R_(Z_AB.covariance.of_specified()),
-        independent_(options.independent) {}
+        independent_(options.independent),
+        merge_(merge) {}
 
   Result<Observation> run() {
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
@@ -169,7 +171,7 @@ class Update {
 
   void apply(const PathMinimum& found, const BoundWeights& weights, Observation& observation) {
     prior_.widen(weights.of_A);
-    const auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_);
+    const auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_, merge_);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
@@ -193,6 +195,7 @@ class Update {
   JointPrior prior_;
   Covariance R_;
   bool independent_;
+  const bool merge_;  // the sources of earlier observations
 };
 
 // The only unspecified edge of a path. It takes what the measurement says: the pose with which the
@@ -201,8 +204,8 @@ class Update {
 class Unspecified {
  public:
   Unspecified(const std::vector<ObservedEdge>& edges, std::size_t index, const Transform& Z_AB,
-              const ObserveOptions& options)
-      : edges_(edges), index_(index), Z_AB_(Z_AB) {
+              const ObserveOptions& options, bool merge)
+      : edges_(edges), index_(index), Z_AB_(Z_AB), merge_(merge) {
     Belief& X_PC = edges_[index].X_PC;
     independent_ = options.independent && !X_PC.unknown;
     // What it had in common with others is part of an error that is not known.
@@ -242,7 +245,7 @@ class Unspecified {
   void correlate(const JointPrior& others, const LinearPath& linear, const std::string& source,
                  Observation& found) const {
     const auto determined = determined_errors(
-        others, index_, linear, root_of(Z_AB_.covariance.of_specified().matrix()), source);
+        others, index_, linear, root_of(Z_AB_.covariance.of_specified().matrix()), source, merge_);
     const auto put = [&](std::size_t k, const CorrectedError& error) {
       found.edges[k].X_PC.own = Covariance::trusted(nearest_semidefinite(error.own));
       found.edges[k].X_PC.common_errors = error.common_errors;
@@ -280,13 +283,12 @@ class Unspecified {
   std::vector<ObservedEdge> edges_;
   std::size_t index_;
   const Transform& Z_AB_;
+  const bool merge_;
   bool independent_ = true;
 };
 
-}  // namespace
-
-Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
-                            const std::string& source, const ObserveOptions& options) {
+Result<Observation> observed(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
+                             const std::string& source, const ObserveOptions& options, bool merge) {
   if (!(options.gate > 0 && options.gate <= 1)) {
     return fail(Errc::kInvalidInput,
                 "gate must be above 0 and no more than 1, not " + number_text(options.gate));
@@ -300,13 +302,26 @@ Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transf
     const bool on_path = edges[k].way != ObservedEdge::Way::kBeside;
     if (on_path && edges[k].X_PC.unspecified) unspecified.push_back(k);
   }
-  if (unspecified.empty()) return Update(edges, Z_AB, source, options).run();
+  if (unspecified.empty()) return Update(edges, Z_AB, source, options, merge).run();
   if (unspecified.size() == 1) {
-    return Unspecified(edges, unspecified.front(), Z_AB, options).run(source);
+    return Unspecified(edges, unspecified.front(), Z_AB, options, merge).run(source);
   }
   return fail(Errc::kInvalidInput, "the covariance of " + std::to_string(unspecified.size()) +
                                        " edges of the path is unspecified: it is undetermined "
                                        "which of them to correct");
+}
+
+}  // namespace
+
+Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
+                            const std::string& source, const ObserveOptions& options) {
+  return observed(edges, Z_AB, source, options, true);
+}
+
+Result<Observation> observe_beside_others(const std::vector<ObservedEdge>& edges,
+                                          const Transform& Z_AB, const std::string& source,
+                                          const ObserveOptions& options) {
+  return observed(edges, Z_AB, source, options, false);
 }
 
 }  // namespace tfdude

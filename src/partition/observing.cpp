@@ -129,11 +129,6 @@ Correlation correlation_of(const Belief& X, const std::vector<std::string>& toge
 
 }  // namespace
 
-bool is_moving(const std::string& id, const PathCorrelation& correlation) {
-  const auto& with = correlation.observed_with;
-  return with.size() >= 2 && with[0] == id && with[1] == id;
-}
-
 Result<ObservePlan> route_observe(const Forest& forest, const Directory& directory,
                                   const std::string& a, const std::string& b,
                                   const std::vector<std::string>& beside,
@@ -206,11 +201,15 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
 }
 
 std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
-                            const Observation& observation) {
+                            const Observation& observation,
+                            const std::vector<std::string>& absent) {
   std::vector<std::string> together;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const auto& [X_PC, corrected, forgotten, innovation] = observation.edges[k];
     if (corrected && !forgotten) together.push_back(plan.edges[k].info.id);
+  }
+  for (const std::string& id : absent) {
+    if (together.size() < kMaxCorrelated) together.push_back(id);
   }
   std::vector<Part> parts;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {

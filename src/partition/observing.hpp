@@ -13,9 +13,6 @@
 // part.
 namespace tfdude {
 
-/// Whether an edge is dynamic, as an answer says (PathCorrelation::observed_with).
-[[nodiscard]] bool is_moving(const std::string& id, const PathCorrelation& correlation);
-
 /// The edges affected by an observation, and the requests to their owners.
 struct ObservePlan {
   struct Edge {
@@ -65,8 +62,10 @@ struct ObservedPath {
                                                  const std::vector<SegmentValues>& answers);
 
 /// The parts of the owners: a ReviseRequest for each owner of an uncertain edge.
+/// @param absent  edges that are correlated with them, and keep their values
 [[nodiscard]] std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
-                                          const Observation& observation);
+                                          const Observation& observation,
+                                          const std::vector<std::string>& absent);
 
 /// Asks an owner for the present values of the edges that a part has revised.
 [[nodiscard]] Part present_values(const ObservePlan& plan, const Part& revised);

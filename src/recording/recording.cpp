@@ -268,11 +268,20 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, std::string_vi
 Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std::string_view b,
                                               Time at_b, std::string_view fixed,
                                               const Query& query) {
+  const auto edges_to = [&](std::string_view frame, const StampedTransform& X) {
+    Query then = query;
+    then.at = X.stamp;
+    return edges_from_fixed(impl_->state().forest(), fixed, frame, then);
+  };
   const auto X_FA = lookup_at(fixed, a, at_a, query);
   if (!X_FA) return tl::unexpected(X_FA.error());
+  auto to_a = edges_to(a, *X_FA);
+  if (!to_a) return tl::unexpected(std::move(to_a.error()));
   const auto X_FB = lookup_at(fixed, b, at_b, query);
   if (!X_FB) return tl::unexpected(X_FB.error());
-  return over_fixed(*X_FA, *X_FB);
+  auto to_b = edges_to(b, *X_FB);
+  if (!to_b) return tl::unexpected(std::move(to_b.error()));
+  return over_fixed(*X_FA, *X_FB, *std::move(to_a), *std::move(to_b), query.order);
 }
 
 Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {

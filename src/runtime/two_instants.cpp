@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "calls/lookup_in_progress.hpp"
-#include "math/symmetric_eigen.hpp"
 #include "partition/observing.hpp"
 #include "tree/over_fixed.hpp"
 
@@ -54,50 +53,19 @@ class TwoPathsTask final : public Task {
     return Next::kDone;
   }
 
-  /// Once it is done: the pose of b in a.
-  [[nodiscard]] Belief X_AB() {
-    for (std::size_t i = 0; i < plans_[0].edges.size(); ++i) {
-      const std::string& id = plans_[0].edges[i].info.id;
-      const auto& others = plans_[1].edges;
-      const auto same = std::find_if(others.begin(), others.end(),
-                                     [&](const auto& edge) { return edge.info.id == id; });
-      if (same == others.end()) continue;
-      const auto k = static_cast<std::size_t>(same - others.begin());
-      const bool one_error = is_static(0, i) && is_static(1, k);
-      for (Belief* X : {&paths_[0].edges[i].X_PC, &paths_[1].edges[k].X_PC}) {
-        share(*X, id, one_error || (at_[0].at && at_[0].at == at_[1].at));
-      }
+  /// Once it is done: the edges to a, or to b.
+  [[nodiscard]] std::vector<EdgeFromFixed> edges(std::size_t side) const {
+    std::vector<EdgeFromFixed> edges;
+    const ObservedPath& path = paths_[side];
+    for (std::size_t i = 0; i < path.edges.size(); ++i) {
+      const std::string& id = plans_[side].edges[i].info.id;
+      edges.push_back({id, path.edges[i].X_PC, path.edges[i].way == ObservedEdge::Way::kUp,
+                       is_moving(id, path.correlations[i])});
     }
-    return compose(inverse(along(0)), along(1), at_[1].order);
+    return edges;
   }
 
  private:
-  [[nodiscard]] bool is_static(std::size_t side, std::size_t edge) const {
-    return !is_moving(plans_[side].edges[edge].info.id, paths_[side].correlations[edge]);
-  }
-
-  // The own error is one that the edge has twice, or it may be correlated with itself in any way.
-  static void share(Belief& X, const std::string& id, bool one_error) {
-    if (X.unknown || X.own.matrix().isZero(0)) return;
-    if (one_error) {
-      const SymmetricEigen eigen = symmetric_eigen(X.own.matrix());
-      const Loading root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
-      X.common_errors.push_back({"edge:" + id, false, root});
-    } else {
-      X.unknown = X.own;
-    }
-    X.own = {};
-  }
-
-  [[nodiscard]] Belief along(std::size_t side) const {
-    Belief X;
-    for (const ObservedEdge& edge : paths_[side].edges) {
-      const bool up = edge.way == ObservedEdge::Way::kUp;
-      X = compose(X, up ? inverse(edge.X_PC) : edge.X_PC, at_[side].order);
-    }
-    return X;
-  }
-
   const Forest& forest_;
   const std::string fixed_;
   const std::string ends_[2];
@@ -116,18 +84,14 @@ Result<StampedTransform> TwoInstants::lookup(const std::string& a, const Query& 
   if (!X_FA) return tl::unexpected(X_FA.error());
   const auto X_FB = lookups_.lookup<std::string_view>(fixed, b, at_b, deadline);
   if (!X_FB) return tl::unexpected(X_FB.error());
-  StampedTransform X_AB = over_fixed(*X_FA, *X_FB);
-  if (!X_AB.covariance.complete() || a == fixed || b == fixed) return X_AB;
+  if (a == fixed || b == fixed) return over_fixed(*X_FA, *X_FB, {}, {}, at_b.order);
   Query then_a = at_a;
   Query then_b = at_b;
   then_a.at = X_FA->stamp;
   then_b.at = X_FB->stamp;
   TwoPathsTask task(structure_.forest, fixed, a, b, then_a, then_b);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
-  const Belief whole = task.X_AB();
-  X_AB.covariance = collapse(whole).covariance;
-  X_AB.basis.bound = whole.unknown.has_value();
-  return X_AB;
+  return over_fixed(*X_FA, *X_FB, task.edges(0), task.edges(1), at_b.order);
 }
 
 }  // namespace tfdude

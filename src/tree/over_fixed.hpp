@@ -3,21 +3,37 @@
 #include <string>
 #include <vector>
 
-#include "tfdude/math/transform.hpp"
+#include "tfdude/math/belief.hpp"
 #include "tfdude/types/query.hpp"
+
+#include "tree/forest.hpp"
 
 namespace tfdude {
 
+/// An edge of a path from the fixed frame, at one instant.
+struct EdgeFromFixed {
+  std::string id;
+  Belief X_PC;
+  bool up = false;  ///< the path goes from the child to the parent
+  bool moving = false;
+};
+
+/// Those of a path in one forest.
+/// @return as Forest::lookup_segments()
+[[nodiscard]] Result<std::vector<EdgeFromFixed>> edges_from_fixed(const Forest& forest,
+                                                                  std::string_view fixed,
+                                                                  std::string_view frame,
+                                                                  const Query& query);
+
 /// The pose of b in a, each at an instant of its own, from their poses in a fixed frame. The stamp
 /// is that of b; the unspecified edges are in the order of the path from a to b.
-[[nodiscard]] inline StampedTransform over_fixed(const StampedTransform& X_FA,
-                                                 const StampedTransform& X_FB) {
-  StampedTransform X_AB{between(X_FA, X_FB), X_FB.stamp};
-  std::vector<std::string>& unspecified = X_AB.basis.unspecified;
-  unspecified.assign(X_FA.basis.unspecified.rbegin(), X_FA.basis.unspecified.rend());
-  unspecified.insert(unspecified.end(), X_FB.basis.unspecified.begin(),
-                     X_FB.basis.unspecified.end());
-  return X_AB;
-}
+///
+/// A static edge on both paths has the same error twice. That of a dynamic one at two instants may
+/// be correlated in any way: the covariance is an upper bound.
+/// @param to_a, to_b  may be empty if no edge is on both paths
+[[nodiscard]] StampedTransform over_fixed(const StampedTransform& X_FA,
+                                          const StampedTransform& X_FB,
+                                          std::vector<EdgeFromFixed> to_a,
+                                          std::vector<EdgeFromFixed> to_b, Order order);
 
 }  // namespace tfdude

@@ -34,6 +34,12 @@ struct PathCorrelation {
   }
 };
 
+/// Whether an edge is dynamic, as a lookup of edges says.
+[[nodiscard]] inline bool is_moving(const std::string& id, const PathCorrelation& correlation) {
+  const auto& with = correlation.observed_with;
+  return with.size() >= 2 && with[0] == id && with[1] == id;
+}
+
 [[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);
 
 /// An edge's new value after an observation.

@@ -145,7 +145,7 @@ TEST_CASE("only owners whose edges change get a part of an observation") {
   const auto observed =
       observe(path->edges, {X_AB, random.covariance()}, "observed:test", ObserveOptions());
   REQUIRE(observed);
-  const auto parts = revisions(*plan, *path, *observed);
+  const auto parts = revisions(*plan, *path, *observed, {});
   REQUIRE(parts.size() == 1);
   CHECK(parts[0].request.id == "arm");
   const auto& revise = std::get<ReviseRequest>(parts[0].request.body);

@@ -71,7 +71,7 @@ TEST_CASE("observations: an observation is repeated if an edge was written in th
   CHECK(revisions == 2);
 }
 
-TEST_CASE("observations: the error says how many owners have applied their part") {
+TEST_CASE("observations: what an owner has applied is taken back if another one has not") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", kArm);
   const ScriptedOwner base(
@@ -85,7 +85,7 @@ TEST_CASE("observations: the error says how many owners have applied their part"
   REQUIRE(outcome(observed) == "state");
   CHECK_THAT(observed.error().message,
              ContainsSubstring("the disk is full") &&
-                 ContainsSubstring("1 of 2 partitions have applied their part"));
+                 ContainsSubstring("0 of 2 partitions have applied their part"));
 }
 
 TEST_CASE("observations: an invalid measurement is rejected before any owner is asked") {
