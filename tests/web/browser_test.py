@@ -120,7 +120,8 @@ class Browser(unittest.TestCase):
         rows = [entry for row in said["covariance"] for entry in row]
 
         def same():
-            return all(abs(shown - row) <= 1e-12 * max(rows) for shown, row in zip(browser.execute_script(picture), rows))
+            shown = browser.execute_script(picture)
+            return all(abs(one - other) <= 1e-12 * max(rows) for one, other in zip(shown, rows))
 
         rig.eventually(same, "the covariance of the owners in the picture")
         self.assertIn("#root=world&a=world&b=tool0", browser.current_url)
