@@ -152,6 +152,11 @@ void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
   const auto span = static_cast<double>(after.stamp - before.stamp);
   const double s = static_cast<double>(moment.t - before.stamp) / span;
   const bool noisy = edge.samples->has_noise();
+  if (!noisy && before.is_given_pose() && after.is_given_pose()) {
+    correlate_next(path, said_of(edge));
+    path.up_between(before.parts(), after.parts(), s);
+    return;
+  }
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
   if (is_correlated(before) || is_correlated(after)) {
     moment.correlated = true;
@@ -164,10 +169,6 @@ void accumulate_between(PathAccumulation<Value>& path, const HeldVersion& edge,
     }
   }
   correlate_next(path, said_of(edge));
-  if (!noisy && before.joint() == nullptr && after.joint() == nullptr) {
-    path.up_between(before.parts(), after.parts(), s);
-    return;
-  }
   OfEdge<Value>& X = path.place();
   interpolate(before, after, s, X);
   if (noisy) add_noise(X, edge, noise);

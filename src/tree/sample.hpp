@@ -30,6 +30,7 @@ struct SharedPart {
   std::uint32_t samples = 0;  ///< that share it; for the writer only
   bool is_joint = false;
   bool is_revised = false;  ///< an observation has made it
+  bool is_given = true;     ///< neither: a pose as it was given
 };
 
 /// What an observation has made of a sample: its error is one row of the joint covariance of all
@@ -84,6 +85,8 @@ class Sample {
     return static_cast<const SharedCovariance*>(shared)->covariance;
   }
   [[nodiscard]] TransformParts parts() const { return {&pose(), &covariance()}; }
+  /// Whether it is a pose as it was given.
+  [[nodiscard]] bool is_given_pose() const { return shared->is_given; }
   /// Null: it is as it was given.
   [[nodiscard]] const SampleRevision* revision() const {
     if (!shared->is_revised) return nullptr;

@@ -63,12 +63,14 @@ const SharedPart* SampleStore::fresh_part(const GivenValue& value) {
     SharedCovariance* part = covariances_.take();
     part->covariance = value.X_PC.covariance;
     part->is_revised = value.revision != nullptr;
+    part->is_given = !part->is_revised;
     part->revision.reset(value.revision != nullptr ? new SampleRevision(*value.revision) : nullptr);
     bytes_ += bytes_of(*part);
     return part;
   }
   SharedJoint* part = joints_.take();
   part->is_joint = true;
+  part->is_given = false;
   part->joint = PreparedJoint(*value.state->joint, value.state->period);
   bytes_ += sizeof(*part);
   return part;
