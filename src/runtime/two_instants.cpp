@@ -1,8 +1,5 @@
 #include "runtime/two_instants.hpp"
 
-#include <algorithm>
-#include <iterator>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,8 +10,8 @@
 namespace tfdude {
 namespace {
 
-// Asks for the edges of two paths from one frame, each at its instant, then which of those that are
-// on both are static.
+// Asks for the edges of two paths from one frame, each at its instant. The answers tell which of
+// them are dynamic.
 class TwoPathsTask final : public Task {
  public:
   TwoPathsTask(const Forest& forest, std::string fixed, std::string a, std::string b,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "tfdude/math/interpolate.hpp"
 #include "tfdude/math/perturbation.hpp"
@@ -23,11 +24,6 @@ Belief belief_of(const Sample& sample, const Correlation* said) {
   belief.common_errors = correlation->common_errors;
   if (correlation->unknown) belief.unknown = std::exchange(belief.own, {});
   return belief;
-}
-
-bool is_unknown(const Sample& sample, const Correlation* said) {
-  const Correlation* correlation = correlation_at(sample, said);
-  return correlation != nullptr && correlation->unknown;
 }
 
 std::vector<CommonError> times(const Matrix6d& factor, std::vector<CommonError> common_errors) {
@@ -108,7 +104,7 @@ CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, 
   const Matrix6d B1 = right_jacobian(s * xi) * right_jacobian(xi).inverse();
   std::vector<CommonError> common_errors = times((1.0 - s) * B0, X0.common_errors);
   add_errors(times(s * B1, X1.common_errors), common_errors);
-  return split(X, std::move(common_errors), is_unknown(before, said) || is_unknown(after, said));
+  return split(X, std::move(common_errors), X0.unknown || X1.unknown);
 }
 
 CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
@@ -135,7 +131,7 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
   X.covariance = bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));
   X.covariance.set_complete(!X1.unspecified && G0.covariance.complete() &&
                             G1.covariance.complete());
-  return split(X, times(to_there, X1.common_errors), is_unknown(after, said));
+  return split(X, times(to_there, X1.common_errors), X1.unknown.has_value());
 }
 
 }  // namespace tfdude
