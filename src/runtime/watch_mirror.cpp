@@ -124,13 +124,13 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
   // commit.
   if (!follows_on && !entry.stamp && !entry.cleared) return std::nullopt;
-  if (begins) {
+  if (!begins) entry.process_noise.reset();
+  // The stamps of another history say nothing about this one: a source's clock may jump back.
+  if (begins || entry.cleared) {
     edge.newest.reset();
-  } else {
-    entry.process_noise.reset();
+    edge.complete.reset();
   }
   edge.history = entry.history;
-  if (entry.cleared) edge.newest.reset();
   if (entry.stamp && (!edge.newest || *entry.stamp > *edge.newest)) edge.newest = entry.stamp;
   return entry;
 }

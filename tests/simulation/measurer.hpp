@@ -60,6 +60,7 @@ class Measurer final : public Actor {
   std::size_t measured_ = 0;                         // how often
   std::size_t open_ = 0;                             // measurements in progress
   bool doubtful_ = true;
+  bool exact_ = true;  // no observation had to keep what another one was about to correct
 };
 
 }  // namespace tfdude::simulation

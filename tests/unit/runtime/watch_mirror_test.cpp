@@ -233,6 +233,12 @@ TEST_CASE("watch mirror: it knows which samples an answer leaves out") {
   mirror.told_from(Time());
   CHECK(mirror.take({kTools, {sample(0, 60, 140, 9, true)}, 0, 10}));
   CHECK(mirror.skipped_from() == Time());
+  mirror.told_from(Time());
+  // So does one that a push after a lost one began, whose stamps are earlier than those before.
+  CHECK(mirror.take({kTools, {sample(0, 10, 100, 12, true)}, 11, 12}));
+  CHECK(mirror.lacks());
+  CHECK(mirror.take({kTools, {sample(0, 30, 120, 12, true)}, 0, 14}));
+  CHECK(mirror.skipped_from() == Time());
 }
 
 }  // namespace tfdude
