@@ -19,8 +19,24 @@
 namespace tfdude::testing {
 namespace {
 
-// Beyond those of other tests.
+// Beyond those of other tests, and different ones for tests that run at the same time.
 constexpr Domains kTwo{230, 2};
+constexpr Domains kOthers{228, 2};
+
+/// What is printed meanwhile, also if a test fails.
+class Printed {
+ public:
+  Printed() : before_(std::cout.rdbuf(text_.rdbuf())) {}
+  ~Printed() { std::cout.rdbuf(before_); }
+  Printed(const Printed&) = delete;
+  Printed& operator=(const Printed&) = delete;
+
+  [[nodiscard]] std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::streambuf* const before_;
+};
 
 /// Receives the announcements of a domain, as a participant.
 class Listener {
@@ -59,16 +75,19 @@ TEST_CASE("domain lease: a domain with a participant of others is not taken") {
 }
 
 TEST_CASE("domain lease: who enters a domain meanwhile is named") {
-  std::ostringstream printed;
-  auto* const before = std::cout.rdbuf(printed.rdbuf());
   {
-    const DomainLease lease(kTwo);
-    const Listener own(lease.number());  // of the test itself: no warning
+    const Printed printed;
+    {
+      const DomainLease lease(kOthers);
+      const Listener own(lease.number());  // of the test itself: no warning
+    }
+    CHECK(printed.text().empty());
   }
-  CHECK(printed.str().empty());
+  std::string text;
   std::string name;
   {
-    std::optional<DomainLease> lease(kTwo);
+    const Printed printed;
+    std::optional<DomainLease> lease(kOthers);
     // A process that is no child of this one.
     Process other({"/usr/bin/setsid", "--fork", "/usr/bin/python3", "-c",
                    "import os, socket, time\n"
@@ -83,10 +102,10 @@ TEST_CASE("domain lease: who enters a domain meanwhile is named") {
     REQUIRE(line);
     name = "process " + line->substr(line->find(' ') + 1) + " (python3)";
     lease.reset();
+    text = printed.text();
     kill(std::stoi(line->substr(line->find(' ') + 1)), SIGKILL);
   }
-  std::cout.rdbuf(before);
-  CHECK_THAT(printed.str(), ContainsSubstring(name));
+  CHECK_THAT(text, ContainsSubstring(name));
 }
 
 }  // namespace tfdude::testing
