@@ -248,6 +248,15 @@ Process* Verdict::find_core(const std::string& partition) const {
   return core ? cast_.find_daemon(partition) : nullptr;
 }
 
+// A root whose owner is down may have been forgotten with it.
+bool Verdict::is_held(const std::string& frame) const {
+  return std::any_of(cast_.daemons.begin(), cast_.daemons.end(), [&](const auto& daemon) {
+    if (daemon == nullptr || find_core(daemon->partition()) != daemon.get()) return false;
+    const auto known = daemon->forest().info(frame);
+    return known && known->owner == kHeldHere;
+  });
+}
+
 // Long after the last write it shows the values of the owners.
 void Verdict::check_follower(Follower& follower) {
   Process* const owner = find_core(follower.partition());
@@ -256,7 +265,7 @@ void Verdict::check_follower(Follower& follower) {
   if (!follower.watches() || !arm || !hears_all(process)) return;
   const auto base = process.forest().info(arm->parent);
   Process* const below = base ? find_core(process.directory().name(base->owner)) : nullptr;
-  if (below == nullptr || base->parent != "world") return;
+  if (below == nullptr || base->parent != "world" || !is_held("world")) return;
   const auto X_WB = below->forest().lookup("world", base->id);
   const auto X_BT = owner->forest().lookup(base->id, follower.tip());
   if (!X_WB || !X_BT) return;

@@ -42,6 +42,8 @@ class Verdict {
   void check_replica(Process& one, const std::vector<std::string>& expected);
   /// Null: no daemon serves it, or it has a lasting fault.
   [[nodiscard]] Process* find_core(const std::string& partition) const;
+  /// By a partition of the core.
+  [[nodiscard]] bool is_held(const std::string& frame) const;
   void check_forgotten(Process& one, const std::string& partition);
   void check_follower(Follower& follower);
   void check_samplers();
