@@ -149,7 +149,7 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   }
   // Other owners will soon have what one owner has applied already, unless an edge was written
   // since.
-  if (path.torn && torn_ < kTornAttempts && !limit_.over(now)) {
+  if (!path.lacking.empty() && torn_ < kTornAttempts && !limit_.over(now)) {
     pause_ = kTornPause * (1 << torn_++);
     return Next::kPlan;
   }
@@ -157,7 +157,7 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
   const std::string source = source_ + "." + std::to_string(attempts_);
-  beside_others_ = !absent_.empty() || path.torn;
+  beside_others_ = !absent_.empty() || !path.lacking.empty();
   const auto found = (beside_others_ ? observe_beside_others : tfdude::observe)(
       path.edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);

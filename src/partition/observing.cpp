@@ -53,25 +53,25 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
   return {};
 }
 
-// Whether an edge that this one was observed with does not depend on the source.
-bool lacks_source(const ObservePlan& plan, const ObservedPath& path, std::size_t edge) {
+// Adds the edges that this one was observed with, but that do not depend on the source of that. One
+// that is listed twice has been waited for before.
+void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t edge,
+                 std::vector<std::string>& lacking) {
   const auto& own = path.edges[edge].X_PC.common_errors;
   const auto& with = path.correlations[edge].observed_with;
   const auto source = std::find_if(own.begin(), own.end(), is_observed);
-  if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) {
-    return false;
-  }
+  if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) return;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const std::string& id = plan.edges[k].info.id;
-    if (std::count(with.begin(), with.end(), id) == 0) continue;
+    if (std::count(with.begin(), with.end(), id) != 1) continue;
     if (is_moving(id, path.correlations[k])) continue;
+    if (std::count(lacking.begin(), lacking.end(), id) > 0) continue;
     const auto& common_errors = path.edges[k].X_PC.common_errors;
     const auto same = [&](const CommonError& common_error) {
       return common_error.source == source->source;
     };
-    if (std::none_of(common_errors.begin(), common_errors.end(), same)) return true;
+    if (std::none_of(common_errors.begin(), common_errors.end(), same)) lacking.push_back(id);
   }
-  return false;
 }
 
 // The request of the edge's owner, in which all its edges are revised at once; another one if it
@@ -117,13 +117,18 @@ bool is_same(const Belief& X, const Revision& revision) {
          (own - revised).norm() <= kRounding * revised.norm();
 }
 
-// The correlation that an owner stores for an observed edge.
-Correlation correlation_of(const Belief& X, const std::vector<std::string>& together) {
+// The correlation that an owner stores for an observed edge. It never lists the edge itself twice,
+// which is how a dynamic one is marked.
+Correlation correlation_of(const std::string& id, const Belief& X,
+                           const std::vector<std::string>& together) {
   Correlation correlation;
   correlation.unknown = X.unknown.has_value();
   correlation.common_errors = X.common_errors;
   const bool observed = std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
-  if (observed) correlation.observed_with = together;
+  if (!observed) return correlation;
+  auto& with = correlation.observed_with = together;
+  const auto own = std::find(with.begin(), with.end(), id);
+  if (own != with.end()) with.erase(std::remove(own + 1, with.end(), id), with.end());
   return correlation;
 }
 
@@ -194,9 +199,7 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
       if (!known) path.missing.push_back(id);
     }
   }
-  for (std::size_t k = 0; k < plan.edges.size() && !path.torn; ++k) {
-    path.torn = lacks_source(plan, path, k);
-  }
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) add_lacking(plan, path, k, path.lacking);
   return path;
 }
 
@@ -208,8 +211,14 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
     const auto& [X_PC, corrected, forgotten, innovation] = observation.edges[k];
     if (corrected && !forgotten) together.push_back(plan.edges[k].info.id);
   }
-  for (const std::string& id : absent) {
+  const auto keep = [&](const std::string& id) {
     if (together.size() < kMaxCorrelated) together.push_back(id);
+  };
+  for (const std::string& id : absent) keep(id);
+  for (const std::string& id : path.lacking) {
+    // Twice: the next observer does not wait for it again, but corrects it if it has come.
+    const bool listed = std::count(together.begin(), together.end(), id) > 0;
+    for (int i = listed ? 1 : 0; i < 2; ++i) keep(id);
   }
   std::vector<Part> parts;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
@@ -219,8 +228,8 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
     ReviseRequest::Edge edge{observed.info.id, result.innovation, !observation.accepted, {}};
     if (result.corrected) {
       const Belief& X = result.X_PC;
-      edge.revision =
-          Revision{edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(X, together)};
+      edge.revision = Revision{
+          edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(edge.id, X, together)};
       edge.revision->X_PC.covariance.set_complete(!X.unspecified);
     }
     revision_of(plan, path, k, parts).edges.push_back(std::move(edge));

@@ -42,9 +42,9 @@ struct ObservedPath {
   std::vector<Seen> seen;            ///< by part
   std::optional<Time> stamp;         ///< of the path
   std::vector<std::string> missing;  ///< edges beside the path that must be requested, too
-  /// An edge lacks the source of its joint observation with another one: another observation may be
-  /// in progress.
-  bool torn = false;
+  /// Edges that lack the source of their joint observation with another one: another observation
+  /// may be in progress.
+  std::vector<std::string> lacking;
 };
 
 /// @param beside  edges observed together with some of the path; those that are missing or cannot

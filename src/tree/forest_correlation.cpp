@@ -48,9 +48,9 @@ void Forest::Impl::unlink(const HeldVersion& edge) {
     if (partner.correlation == nullptr || !partner.correlation->revised) continue;
     EdgeCorrelation left{partner.correlation->said, partner.correlation->now, true, 0};
     auto& with = left.now.observed_with;
-    const auto own = std::find(with.begin(), with.end(), id);
+    const auto own = std::remove(with.begin(), with.end(), id);
     if (own == with.end()) continue;
-    with.erase(own);
+    with.erase(own, with.end());
     HeldVersion& fresh = push_held(*slot, partner.X_PC);
     set_correlation(fresh, std::make_unique<EdgeCorrelation>(std::move(left)));
   }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "math/observe_beside.hpp"
 #include "partition/partition.hpp"
 #include "support/catch.hpp"
 #include "support/pose_diff.hpp"
@@ -118,17 +119,44 @@ TEST_CASE("answers are assembled in the order of the edges and missing edges are
   CHECK(path->seen[0].commit == 7);
   CHECK(path->seen[1].commit == 8);
   CHECK(path->seen[1].incarnation == 77);
-  CHECK_FALSE(path->torn);
+  CHECK(path->lacking.empty());
   // An observation that only one of its owners has applied.
   const CommonError common_error{"observed:other", true, Loading::Ones(6, 1)};
   answers[0].correlations[0].common_errors = {common_error};
-  CHECK(observed_path(*plan, answers)->torn);
+  CHECK(observed_path(*plan, answers)->lacking == std::vector<std::string>{"hand"});
+  // One that has been waited for before.
+  answers[0].correlations[0].observed_with = {"tool", "leg", "hand", "hand"};
+  CHECK(observed_path(*plan, answers)->lacking.empty());
+  answers[0].correlations[0].observed_with = {"tool", "leg", "hand"};
   answers[1].correlations[0].common_errors = {common_error};
-  CHECK_FALSE(observed_path(*plan, answers)->torn);
+  CHECK(observed_path(*plan, answers)->lacking.empty());
   answers[1].values.pop_back();
   const auto short_of_one = observed_path(*plan, answers);
   REQUIRE_FALSE(short_of_one);
   CHECK(short_of_one.error().code == Errc::kNotOwner);
+}
+
+TEST_CASE("an observation beside one in progress stays tied to the edges that lack it") {
+  Random random(0x0b57);
+  const Known known(random);
+  const auto plan = route_observe(known.forest, known.directory, "hand", "tool", {"hand"}, {});
+  REQUIRE(plan);
+  auto answers = answers_to(*plan, random);
+  const Loading little = 1e-3 * Loading::Ones(6, 1);
+  answers[0].correlations[0] = {{}, {{"observed:other", true, little}}, {"hand", "tool"}};
+  const auto path = observed_path(*plan, answers);
+  REQUIRE(path);
+  REQUIRE(path->lacking == std::vector<std::string>{"hand"});
+  const auto found = observe_beside_others(
+      path->edges, {path->edges[0].X_PC.pose, random.covariance()}, "observed:this", {1, true});
+  REQUIRE(found);
+  const auto parts = revisions(*plan, *path, *found, {});
+  REQUIRE(parts.size() == 1);
+  const auto& edges = std::get<ReviseRequest>(parts[0].request.body).edges;
+  REQUIRE(edges.size() == 1);
+  CHECK(edges[0].id == "tool");
+  CHECK(edges[0].revision->correlation.observed_with ==
+        std::vector<std::string>{"tool", "hand", "hand"});
 }
 
 TEST_CASE("only owners whose edges change get a part of an observation") {
