@@ -39,13 +39,7 @@ Covariance transported(const Columns& X, const Covariance& sigma) {
 
 void add_transported(const Columns& X, const Loading& F, Loading& sum) {
   widen(sum, F.cols());
-  const Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<4>> R(X.R[0]);
-  const Eigen::Map<const Eigen::Vector3d> t(X.t);
-  for (Eigen::Index k = 0; k < F.cols(); ++k) {
-    const Eigen::Vector3d theta = R * F.col(k).tail<3>();
-    sum.col(k).head<3>() += R * F.col(k).head<3>() + t.cross(theta);
-    sum.col(k).tail<3>() += theta;
-  }
+  functions().add_columns(X, F.data(), static_cast<std::size_t>(F.cols()), sum.data());
 }
 
 Transform transform_of(const Edge& edge) {

@@ -82,6 +82,8 @@ struct Functions {
                                const Edges& from_b, double* X_AB);
   /// Ad(X) Σ Ad(X)ᵀ, both as upper triangles, row by row.
   void (*transport)(const Columns& X, const double* upper, double* transported);
+  /// sum += Ad(X) F, both with six rows and `count` columns, column by column.
+  void (*add_columns)(const Columns& X, const double* F, std::size_t count, double* sum);
   /// As interpolate(), for the pairs that are near.
   void (*blend_poses)(Blend* const* all, std::size_t count);
   void (*blend_with_covariance)(Blend* const* all, std::size_t count);

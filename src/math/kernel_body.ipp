@@ -309,5 +309,15 @@ void transport(const Columns& X, const double* upper, double* transported) {
   store_upper(sum, transported);
 }
 
+void add_columns(const Columns& columns, const double* F, std::size_t count, double* sum) {
+  const Motion X = load(columns);
+  for (std::size_t k = 0; k < count; ++k, F += 6, sum += 6) {
+    const V4 theta = combine(X.R, F[3], F[4], F[5]);
+    const V4 rho = combine(X.R, F[0], F[1], F[2]) + cross(X.t, theta);
+    for (int i = 0; i < 3; ++i) sum[i] += rho[i];
+    for (int i = 0; i < 3; ++i) sum[3 + i] += theta[i];
+  }
+}
+
 #include "math/kernel_blend.ipp"
 #include "math/kernel_fourth.ipp"

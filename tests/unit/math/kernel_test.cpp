@@ -63,6 +63,22 @@ TEST_CASE("the portable kernel and that of this processor transport alike") {
   }
 }
 
+TEST_CASE("the portable kernel and that of this processor add columns alike") {
+  Random random(253);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 100; ++i) {
+    const Pose X = random.pose();
+    const Loading F = Loading::Random(6, i % 7);
+    const Loading before = Loading::Random(6, i % 7);
+    for (const auto* functions : {&kernel::functions(), &kernel::kPortable}) {
+      Loading sum = before;
+      functions->add_columns(kernel::columns_of(X), F.data(), static_cast<std::size_t>(F.cols()),
+                             sum.data());
+      CHECK((sum - before - adjoint(X) * F).norm() < 1e-12);
+    }
+  }
+}
+
 TEST_CASE("the portable kernel and that of this processor interpolate alike") {
   Random random(251);
   INFO("seed " << random.seed());
