@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the figures of docs/uncertainty.md and writes its tables, from results of the library.
+"""Draws the figures of docs/accuracy.md and writes its tables, from results of the library.
 
 The page's text is written by hand; this program writes the tables between two markers.
 """
@@ -14,7 +14,7 @@ import sys
 import uncertainty_figures
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "uncertainty.md"
+PAGE = ROOT / "docs" / "accuracy.md"
 FIGURES = ROOT / "docs" / "uncertainty"
 
 # Results of an earlier reference run with its own 10^6 samples.

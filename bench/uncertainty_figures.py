@@ -1,4 +1,4 @@
-"""Draws the figures of docs/uncertainty.md as SVG; equal results give equal files."""
+"""Draws the figures of docs/accuracy.md as SVG; equal results give equal files."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-// The experiments of docs/uncertainty.md, run with the library: prints one JSON document, the same
+// The experiments of docs/accuracy.md, run with the library: prints one JSON document, the same
 // each time. bench/uncertainty.py draws it.
 
 #include <cmath>

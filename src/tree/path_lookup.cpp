@@ -116,7 +116,8 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const HeldVersion&
   const double noise = beyond * s + seconds(moment.age);
   if constexpr (!std::is_same_v<Value, Pose>) {
     if (revised || said_of(edge) != nullptr) {
-      CorrelatedValue ahead = extrapolate_correlated(*before, *newest, edge.X_PC, s, said_of(edge));
+      CorrelatedValue ahead = extrapolate_correlated(*before, *newest, edge.X_PC, s, said_of(edge),
+                                                     edge.samples->timing().drifts);
       correlate_next(path, &ahead.correlation);
       Transform& X = path.place();
       X = ahead.X_PC;

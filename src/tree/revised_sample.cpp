@@ -108,8 +108,8 @@ CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, 
 }
 
 CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
-                                       const Transform& X_newest, double s,
-                                       const Correlation* said) {
+                                       const Transform& X_newest, double s, const Correlation* said,
+                                       bool drifts) {
   const double beyond = s - 1.0;
   if (before.revision() == nullptr && after.revision() == nullptr) {
     CorrelatedValue found;
@@ -127,10 +127,15 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
   Transform X{X1.pose * ahead, StatedCovariance()};
   const Matrix6d to_there = adjoint(ahead.inverse());
   const Covariance offset = collapse(X1).covariance.of_specified().transported(ahead.inverse());
-  const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
-  X.covariance = bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));
-  X.covariance.set_complete(!X1.unspecified && G0.covariance.complete() &&
-                            G1.covariance.complete());
+  X.covariance = offset;
+  bool complete = !X1.unspecified;
+  if (!drifts) {
+    const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
+    X.covariance =
+        bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));
+    complete = complete && G0.covariance.complete() && G1.covariance.complete();
+  }
+  X.covariance.set_complete(complete);
   return split(X, times(to_there, X1.common_errors), X1.unknown.has_value());
 }
 

@@ -47,8 +47,9 @@ struct CorrelatedValue {
 /// samples as given: the correction is an offset, and stays. Common errors that are said of the
 /// edge may differ from sample to sample, as own parts may, and grow as those do.
 /// @param X1  the value of `after`
+/// @param drifts  the samples tell exactly how the edge has moved, apart from its process noise
 [[nodiscard]] CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
                                                      const Transform& X1, double s,
-                                                     const Correlation* said);
+                                                     const Correlation* said, bool drifts);
 
 }  // namespace tfdude

@@ -9,7 +9,7 @@
 #include "support/random.hpp"
 #include "support/sampling.hpp"
 
-// The experiments of docs/uncertainty.md: their parameters and samples. Both the tests and the
+// The experiments of docs/accuracy.md: their parameters and samples. Both the tests and the
 // program that computes the page's figures use this file, so they cannot differ.
 //
 // Barfoot & Furgale, "Associating uncertainty with three-dimensional poses for use in estimation

@@ -71,7 +71,7 @@ struct Belief {
 /// of second order if the errors are correlated, of fourth order if not. Unknown parts enter to
 /// second order only.
 /// For errors above half a radian the series may give no valid covariance; terms of sixth order are
-/// then added. Beyond a radian it is no more accurate than second order; docs/uncertainty.md has
+/// then added. Beyond a radian it is no more accurate than second order; docs/accuracy.md has
 /// figures.
 /// In X_WA⁻¹ X_WB, where B's error was composed from A's, terms quadratic in A's common errors
 /// count twice as own and do not cancel. Second order is right there, and fourth is too large.

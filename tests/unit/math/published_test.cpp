@@ -1,5 +1,5 @@
 // Experiments of the literature, as far as their parameters are known to us, with the numbers that
-// docs/uncertainty.md shows. A tolerance is at least five standard errors of the samples, so that
+// docs/accuracy.md shows. A tolerance is at least five standard errors of the samples, so that
 // any seed passes.
 
 #include "support/published.hpp"

@@ -176,4 +176,27 @@ TEST_CASE("drift: the object in the map and in the base is as certain as is righ
   CHECK_CONSISTENT(in_base);
 }
 
+TEST_CASE("drift: beyond the newest sample the error goes on from there") {
+  Drifting robot;
+  for (int step = 0; step < 3; ++step) {
+    robot.G = robot.G * shift(0.3);
+    robot.drive(step);
+  }
+  REQUIRE(robot.see({robot.G.inverse(), of_deviations(0.01, 0.01)}, 2, "observed:1"));
+  const auto newest = robot.forest.lookup("world", "base", when(2));
+  REQUIRE(newest);
+  Query ahead = when(3);
+  ahead.extrapolate = std::chrono::seconds(1);
+  const auto X = robot.forest.lookup("world", "base", ahead);
+  REQUIRE(X);
+  REQUIRE(X->covariance.complete());
+  // As long again as the interval of the samples, whose twist is wrong by what it drifted then.
+  const Matrix6d expected =
+      newest->covariance.of_specified().transported(shift(0.3).inverse()).matrix() +
+      2 * kStep * robot.Q.matrix();
+  const Matrix6d found = X->covariance.of_specified().matrix();
+  CHECK((found - expected).norm() < 1e-9 * expected.norm());
+  CHECK(X->pose.translation().x() == Approx(newest->pose.translation().x() + 0.3));
+}
+
 }  // namespace tfdude
