@@ -23,6 +23,10 @@ inline void add_network_options(CLI::App& app, Options& options) {
       ->excludes(profile);
   app.add_option("--keys", options.keys,
                  "directory of an identity, see tfdude keys (else $TFDUDE_KEYS)");
+  app.add_flag_callback(
+      "--no-shared-memory", [&options] { options.shared_memory = false; },
+      "neither read the memory of other processes nor let them read (or "
+      "TFDUDE_SHARED_MEMORY=off)");
   app.add_option("--discovery-server", options.discovery_server,
                  "HOST:PORT of a Fast DDS discovery server")
       ->check([](const std::string& text) {

@@ -127,6 +127,9 @@ def _core():
                              ("lookup_fourth/independent", "to fourth order", 10)):
         yield Target("Core", f"lookup over 30 own edges {what}",
                      value_of(f"core/{key}/30/100", "median", microseconds), bound, unit="µs")
+    for key, who, bound in (("1_owner", "another owner", 1.25), ("16_owners", "16 other owners", 1.3)):
+        yield Target("Core", f"lookup over 30 edges with covariance, read in the memory of {who} / own",
+                     ratio_of(f"core/lookup_read/{key}/30/100", "core/lookup/ours_by_handle/30/100"), bound)
     for shape in ("2/10", "30/100", "30/1000", "1000/10000"):
         frames = shape.split("/")[1]
         yield Target("Core", f"set an edge of {frames} frames: by handle / tf2",

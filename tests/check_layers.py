@@ -14,7 +14,7 @@ import tempfile
 import unittest
 
 LAYERS = ["base", "math", "types", "tree", "partition", "calls", "description", "store", "keys", "recording",
-          "transport", "runtime", "client", "apps", "python"]
+          "transport", "memory", "runtime", "client", "apps", "python"]
 # Use the library as everybody does, and know nothing of each other.
 USERS = ["apps", "python"]
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}

@@ -6,11 +6,15 @@
 // the edges are correlated: independent; all edges share a source; or unknown. The operations are
 //   lookup_correlated   with covariance to second order
 //   lookup_fourth       to fourth order
+//   lookup_read         frames of so many owners, in their memory. The owners are in this process,
+//                       but their memory is mapped and read as that of others is.
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 
@@ -108,6 +112,33 @@ void look_up_correlated(benchmark::State& state, Shape shape, Errors errors, Ord
   for (auto _ : state) benchmark::DoNotOptimize(node->lookup(a, b, query));
 }
 
+// The frames of a tree in turn: each owner has as many as the others, next to each other on the path.
+void look_up_read(benchmark::State& state, Shape shape, std::size_t owners) {
+  const bench::Tree& tree = tree_of(shape);
+  LoopbackNetwork network;
+  std::vector<Node> nodes;
+  std::vector<std::vector<FrameSpec>> shares(owners);
+  for (std::size_t i = 0; i < tree.frames.size(); ++i) {
+    const std::size_t on_path = std::min(i, shape.first);
+    shares[on_path * owners / (shape.first + 1)].push_back(tree.frames[i]);
+  }
+  for (std::size_t i = 0; i < owners; ++i) {
+    auto node = Node::open(network.join(), "owner " + std::to_string(i), shares[i], Options());
+    if (!node) std::abort();
+    nodes.push_back(*std::move(node));
+  }
+  auto client = Client::open(network.join(), Options());
+  if (!client || !client->lookup(tree.from, tree.to)) std::abort();
+  client->find_memory();
+  const auto partitions = client->partitions();
+  for (const PartitionInfo& partition : *partitions) {
+    if (!partition.in_memory) std::abort();
+  }
+  const Handle a = *client->find(tree.from);
+  const Handle b = *client->find(tree.to);
+  for (auto _ : state) benchmark::DoNotOptimize(client->lookup(a, b));
+}
+
 void set_by_handle(benchmark::State& state, Shape shape) {
   Node& node = node_of(shape);
   const Handle edge = *node.find(tree_of(shape).from);
@@ -180,6 +211,8 @@ int main(int argc, char** argv) {
   enter_correlated("lookup_correlated/unknown", Errors::kUnknown, Order::kSecond);
   enter_correlated("lookup_fourth/independent", Errors::kIndependent, Order::kFourth);
   enter_correlated("lookup_fourth/shared", Errors::kShared, Order::kFourth);
+  enter("lookup_read/1_owner", Shape{30, 100}, look_up_read, 1U);
+  enter("lookup_read/16_owners", Shape{30, 100}, look_up_read, 16U);
   for (const Shape& shape : {Shape{2, 10}, {30, 100}, {30, 1000}, {1000, 10000}}) {
     enter("set/ours_by_handle", shape, set_by_handle);
     enter("set/ours_by_name", shape, set_by_name);

@@ -94,7 +94,10 @@ void bind_structure(py::module_& module) {
       .def_property_readonly("compatible", &PartitionInfo::compatible)
       .def_property_readonly(
           "clock", [](const PartitionInfo& info) { return clock_name(info.clock); },
-          "'system', 'external' or None.");
+          "'system', 'external' or None.")
+      .def_readonly("in_memory", &PartitionInfo::in_memory, "Whether lookups read its memory.")
+      .def_readonly("why_not_in_memory", &PartitionInfo::why_not_in_memory,
+                    "Why they ask it over DDS; empty: they do not.");
   py::class_<Change>(module, "Change", "A change of the structure.")
       .def_property_readonly(
           "kind", [](const Change& change) { return std::string(to_string(change.kind)); },

@@ -342,7 +342,14 @@ bool Client::exists(const std::string& id) { return participant_->queries().info
 Result<std::vector<Frame>> Client::frames() { return participant_->queries().frames(); }
 
 Result<std::vector<PartitionInfo>> Client::partitions() {
-  return participant_->queries().partitions();
+  auto partitions = participant_->queries().partitions();
+  if (partitions) participant_->memory().tell(*partitions);
+  return partitions;
+}
+
+void Client::find_memory() {
+  // Which waits until they are known.
+  if (participant_->queries().partitions()) participant_->memory().find_all();
 }
 
 Subscription Client::on_change(std::function<void(const Change&)> listener) {

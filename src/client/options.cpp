@@ -24,6 +24,8 @@ std::uint32_t domain_of_environment() {
 
 std::string profile_of_environment() { return std::string(environment("TFDUDE_PROFILE")); }
 
+bool shared_memory_of_environment() { return environment("TFDUDE_SHARED_MEMORY") != "off"; }
+
 std::string keys_of_environment() { return std::string(environment("TFDUDE_KEYS")); }
 
 }  // namespace tfdude

@@ -165,6 +165,10 @@ struct DescriptionRequest {
   std::uint64_t from = 0;
 };
 
+/// Asks where processes of the same computer can read the memory of the partition. The request's id
+/// is the name of the partition asked.
+struct MemoryRequest {};
+
 /// The last character of an entry of FramesRequest::trees that is the beginning of ids.
 inline constexpr char kAnyName = '*';
 
@@ -178,7 +182,7 @@ struct Request {
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
-               DescriptionRequest>
+               DescriptionRequest, MemoryRequest>
       body;
   /// The sender awaits no replies of this partition to requests with lower numbers, in whatever
   /// order they come. Not greater than the full number of this request, of which `sequence` has the
@@ -217,6 +221,16 @@ struct DescriptionPart {
 
 inline constexpr std::size_t kMaxDescriptionPart = 32768;
 
+/// Where processes of the same computer can read the memory of an owner.
+struct MemoryOffer {
+  std::string kernel;  ///< that runs the owner: the random id of its start
+  std::string socket;  ///< at which it passes its memory to who shows the token; empty: nowhere
+  std::array<std::uint64_t, 2> token{};  ///< random
+  std::uint64_t layout = 0;              ///< layout_hash()
+  std::uint64_t incarnation = 0;
+  std::string why_not{};  ///< if nowhere
+};
+
 struct Done {};
 
 struct Reply {
@@ -227,7 +241,7 @@ struct Reply {
   /// Done, the error, or the requested data.
   std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>, std::vector<KnownFrame>,
-               DescriptionPart>
+               DescriptionPart, MemoryOffer>
       body;
   /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;

@@ -18,11 +18,12 @@ Error not_asked_yet(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-Lookups::Lookups(const Context& context, const WatchClient& watches)
+Lookups::Lookups(const Context& context, const WatchClient& watches, MemoryReads* memory)
     : structure_(context.structure),
       discovery_(context.discovery),
       requests_(context.requests),
       watches_(watches),
+      memory_(memory),
       timeout_(context.options.timeout),
       pending_(context.structure.forest, context.requests.replies(), context.requests, hints_,
                static_cast<LookupHost&>(*this), context.threads, timeout_) {}
@@ -43,6 +44,7 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
                   {std::string(a), std::string(b), query});
   auto asked = requests_.run(task, deadline);
   if (!asked) return tl::unexpected(std::move(asked.error()));
+  if (memory_ != nullptr) memory_->asked(task.parts());
   return std::move(task.X_AB());
 }
 

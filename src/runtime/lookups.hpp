@@ -6,11 +6,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "tfdude/math/transform.hpp"
 #include "tfdude/types/query.hpp"
 
 #include "runtime/discovery.hpp"
+#include "runtime/memory_reads.hpp"
 #include "runtime/pending_lookups.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/structure.hpp"
@@ -24,7 +26,8 @@ namespace tfdude {
 class Lookups final : private LookupHost {
  public:
   /// @param watches  of values that others push
-  Lookups(const Context& context, const WatchClient& watches);
+  /// @param memory  null: all others are asked
+  Lookups(const Context& context, const WatchClient& watches, MemoryReads* memory = nullptr);
 
   /// Ends all waiting lookups and callbacks: as PendingLookups::stop().
   void stop() { pending_.stop(); }
@@ -33,7 +36,7 @@ class Lookups final : private LookupHost {
   // be asked.
   template <class Name>
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
-    auto X_AB = structure_.forest.lookup(a, b);
+    auto X_AB = here([&](auto& from) { return from.lookup(a, b); });
     if (!X_AB && !is_of_time(X_AB.error())) {
       X_AB = elsewhere(a, b, {}, discovery_.call_deadline()).map([](const StampedTransform& X) {
         return Transform{X.pose, X.covariance};
@@ -43,13 +46,13 @@ class Lookups final : private LookupHost {
   }
   template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
-    auto X_AB = structure_.forest.lookup_pose(a, b);
+    auto X_AB = here([&](auto& from) { return from.lookup_pose(a, b); });
     if (!X_AB) X_AB = lookup(a, b).map([](const Transform& found) { return found.pose; });
     return X_AB;
   }
   template <class Name>
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
-    auto X_AB = structure_.forest.lookup(a, b, query);
+    auto X_AB = here([&](auto& from) { return from.lookup(a, b, query); });
     if (!X_AB && !is_of_time(X_AB.error())) {
       X_AB = elsewhere(a, b, query, discovery_.call_deadline());
     }
@@ -58,7 +61,7 @@ class Lookups final : private LookupHost {
   template <class Name>
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query,
                                                 const Deadline& deadline) {
-    auto X_AB = structure_.forest.lookup(a, b, query);
+    auto X_AB = here([&](auto& from) { return from.lookup(a, b, query); });
     if (!X_AB && !is_of_time(X_AB.error())) X_AB = elsewhere(a, b, query, deadline);
     return X_AB;
   }
@@ -89,6 +92,16 @@ class Lookups final : private LookupHost {
   }
   [[nodiscard]] std::optional<Time> clock() const override { return structure_.clock.now(); }
 
+  /// What `look` finds in the memory of this process and, if any is attached, in that of others. The
+  /// error is the forest's.
+  template <class Look>
+  [[nodiscard]] auto here(Look look) -> decltype(look(std::declval<const Forest&>())) {
+    const Forest& own = structure_.forest;
+    const bool reads = memory_ != nullptr && memory_->any();
+    auto X_AB = reads ? look(*memory_) : look(own);
+    if (reads && !X_AB) X_AB = look(own);
+    return X_AB;
+  }
   static bool is_of_time(const Error& error) {
     return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
   }
@@ -102,6 +115,7 @@ class Lookups final : private LookupHost {
   Discovery& discovery_;
   Requests& requests_;
   const WatchClient& watches_;
+  MemoryReads* const memory_;
   const Milliseconds timeout_;
   SharedHints hints_;
   PendingLookups pending_;  // last: it uses the other members

@@ -17,12 +17,14 @@ double seconds_of(Time time) { return static_cast<double>(nanoseconds(time)) * 1
 
 Participant::Participant(TransportPtr transport, std::string partition, const Options& options)
     : options_(options),
-      structure_(options.clock, partition),
+      process_memory_(ProcessMemory::open(options.shared_memory, !partition.empty())),
+      structure_(options.clock, partition, process_memory_.arena),
       transport_(std::move(transport)),
       context_{options_, structure_, *transport_, discovery_, member_, requests_, threads_},
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(context_, std::move(partition), *this),
       requests_(structure_, discovery_, *transport_, *this, follow()),
+      memory_(context_, process_memory_),
       yielding_(context_),
       serving_(context_),
       queries_(context_),
@@ -31,7 +33,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       observations_(context_),
       watches_(context_),
       watch_server_(context_, watches_),
-      lookups_(context_, watches_),
+      lookups_(context_, watches_, &memory_),
       velocities_(context_, lookups_),
       two_instants_(context_, lookups_),
       descriptions_(requests_, options.description),
@@ -41,6 +43,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
 }
 
 void Participant::on_routes() {
+  memory_.look_again();
   watches_.look_again();
   streams_.look_again();
   lookups_.look_again();
@@ -67,6 +70,7 @@ Reply Participant::answer_own(const Request& request) {
 Participant::~Participant() {
   // Callbacks may use all other parts.
   lookups_.stop();
+  memory_.stop();
   member_.stop_events();
   threads_.callbacks.stop();
   streams_.stop();
@@ -123,6 +127,9 @@ std::optional<Reply> Participant::answer_query(const Request& request) {
   if (std::holds_alternative<FramesRequest>(request.body)) return answer_frames(request);
   if (std::holds_alternative<DescriptionRequest>(request.body))
     return descriptions_.answer(request);
+  if (std::holds_alternative<MemoryRequest>(request.body)) {
+    return memory_.answer(request, member_.incarnation());
+  }
   return std::nullopt;
 }
 

@@ -16,6 +16,7 @@
 #include "runtime/joint_calls.hpp"
 #include "runtime/lookups.hpp"
 #include "runtime/member_runner.hpp"
+#include "runtime/memory_reads.hpp"
 #include "runtime/observations.hpp"
 #include "runtime/queries.hpp"
 #include "runtime/requests.hpp"
@@ -54,6 +55,7 @@ class Participant final : public TransportHandler,
   [[nodiscard]] Discovery& discovery() { return discovery_; }
   [[nodiscard]] MemberRunner& member() { return member_; }
   [[nodiscard]] Queries& queries() { return queries_; }
+  [[nodiscard]] MemoryReads& memory() { return memory_; }
   [[nodiscard]] Writes& writes() { return writes_; }
   [[nodiscard]] JointCalls& joints() { return joints_; }
   [[nodiscard]] Observations& observations() { return observations_; }
@@ -132,6 +134,7 @@ class Participant final : public TransportHandler,
   [[nodiscard]] std::optional<Reply> answer_query(const Request& request);
 
   const Options options_;
+  ProcessMemory process_memory_;
   Structure structure_;
   TransportPtr transport_;
   Threads threads_;
@@ -139,6 +142,7 @@ class Participant final : public TransportHandler,
   Discovery discovery_;
   MemberRunner member_;
   Requests requests_;
+  MemoryReads memory_;
   Yielding yielding_;
   Serving serving_;
   Queries queries_;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "base/mutex.hpp"
 #include "partition/directory.hpp"
@@ -13,8 +15,11 @@ namespace tfdude {
 /// Lookups of values read the forest without it. Also the clock of its stamps.
 struct Structure {
   /// @param own  the partition that this process serves; empty: none
-  Structure(ClockKind kind, const std::string& own)
-      : clock(kind), forest([this] { return clock.now(); }), directory(forest, own) {}
+  /// @param arena  as for Forest
+  Structure(ClockKind kind, const std::string& own, std::shared_ptr<Arena> arena = nullptr)
+      : clock(kind),
+        forest([this] { return clock.now(); }, std::move(arena)),
+        directory(forest, own) {}
 
   SourceClock clock;
   Forest forest;

@@ -25,6 +25,9 @@
 
 namespace tfdude {
 
+class Arena;
+class RemoteEdges;
+
 /// A new value X_PC for an edge, with the edge's correlation, in the same commit.
 struct CorrelatedUpdate {
   Handle frame;
@@ -99,7 +102,9 @@ class Forest {
 
   /// @param clock  stamps updates of dynamic edges that have no stamp; without a clock these are
   ///   rejected
-  explicit Forest(Clock clock = nullptr);
+  /// @param arena  the memory of all that lookups read, which others may read, too (RemoteForest);
+  ///   null: the heap
+  explicit Forest(Clock clock = nullptr, std::shared_ptr<Arena> arena = nullptr);
   ~Forest();
   Forest(const Forest&) = delete;
   Forest& operator=(const Forest&) = delete;
@@ -240,6 +245,26 @@ class Forest {
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query) const;
   [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query) const;
+
+  /// As above, where others hold edges of the path that can be read in their memory. All edges of
+  /// one owner are of one commit.
+  /// @return an error without a text: kNotOwner, if an edge is not bound; see bind(). Others: the
+  ///   owners have to be asked, as they have no data, cannot be read, or must say why not
+  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b,
+                                         const RemoteEdges& others) const;
+  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b, const RemoteEdges& others) const;
+  [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b,
+                                         const RemoteEdges& others) const;
+  [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b, const RemoteEdges& others) const;
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query,
+                                                const RemoteEdges& others) const;
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query,
+                                                const RemoteEdges& others) const;
+  /// Binds the edges of others on the path to the memory of those that are attached.
+  /// @return how many of them are bound now, if all are; otherwise 0
+  std::size_t bind(std::string_view a, std::string_view b, RemoteEdges& others) const;
+  std::size_t bind(Handle a, Handle b, RemoteEdges& others) const;
 
   /// As lookup(), for segments of a path that another participant asks for. Their ends may be
   /// frames that do not exist, if held edges name them as their parent.

@@ -40,7 +40,7 @@ void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
 }
 
 void Forest::Impl::unlink(const HeldVersion& edge) {
-  const std::string& id = edge.name->text;
+  const std::string_view id = edge.name->text;
   for (const std::string& other : edge.correlation->now.observed_with) {
     const auto slot = frames_.held_slot(other);
     if (!slot || *slot == edge.slot) continue;
@@ -108,7 +108,8 @@ Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correl
 }
 
 ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
-  ChangedEdge kept{edge.name->text, edge.X_PC, {}, {std::nullopt, edge.stamp == kNoSample}};
+  ChangedEdge kept{
+      std::string(edge.name->text), edge.X_PC, {}, {std::nullopt, edge.stamp == kNoSample}};
   if (edge.moving() && !edge.lacks_sample()) kept.time.stamp = tfdude::time_of(edge.stamp);
   if (edge.correlation == nullptr) return kept;
   kept.correlation.said = edge.correlation->said;

@@ -33,14 +33,15 @@ Result<void> check_timing(const EdgeTiming& timing) {
 Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
     if (!frames_.newest(slot).held()) continue;
-    delete frames_.newest_value(slot).samples;
-    delete frames_.newest_value(slot).correlation;
+    SampleHistory::destroy(frames_.newest_value(slot).samples);
+    delete frames_.newest_value(slot).correlation.get();
   }
 }
 
 void Forest::Impl::restart_history(const HeldVersion& newest, const GivenValue& value,
                                    std::int64_t stamp) {
-  const HistoryRestart restart{newest.name->text, time_of(newest.stamp), time_of(stamp)};
+  const HistoryRestart restart{std::string(newest.name->text), time_of(newest.stamp),
+                               time_of(stamp)};
   begin_history(newest, value, stamp);
   newest.name->refused.end_row();
   if (restart_listener_) restart_listener_(restart);
@@ -104,7 +105,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
   fresh.history = fresh.commit;
   SampleHistory* before = fresh.samples;
   if (before == nullptr) return;
-  fresh.samples = new SampleHistory(before->timing());
+  fresh.samples = SampleHistory::create(*arena_, before->timing()).release();
   fresh.stamp = kAlways;
   give_back(before);
 }
@@ -118,7 +119,9 @@ void Forest::Impl::clear_history(const HeldVersion& edge) {
 }
 
 void Forest::Impl::await_sample(HeldVersion& fresh, std::int64_t stamp) {
-  if (fresh.samples == nullptr) fresh.samples = new SampleHistory(default_timing_);
+  if (fresh.samples == nullptr) {
+    fresh.samples = SampleHistory::create(*arena_, default_timing_).release();
+  }
   fresh.stamp = stamp;
   fresh.number = 0;
 }
@@ -167,8 +170,8 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   const bool resumes = newest.left_behind() || left.cleared;
   HeldVersion& fresh = impl_->push_held(*slot, newest.X_PC);
   impl_->forget_history(fresh);
-  delete fresh.samples;  // no reader has seen it
-  fresh.samples = new SampleHistory(timing);
+  SampleHistory::destroy(fresh.samples);  // no reader has seen it
+  fresh.samples = SampleHistory::create(*impl_->arena_, timing).release();
   if (resumes) {
     impl_->resume_history(fresh, left);
   } else if (timing.moving) {

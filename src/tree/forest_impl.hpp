@@ -22,7 +22,12 @@ namespace tfdude {
 /// (check_sample()), and the clock (StampClock).
 class Forest::Impl {
  public:
-  explicit Impl(Clock clock) : now_(clock), clock_(std::move(clock)) {}
+  Impl(Clock clock, std::shared_ptr<Arena> arena)
+      : arena_(arena != nullptr ? std::move(arena) : std::make_shared<Arena>()),
+        frames_(*arena_),
+        now_(clock),
+        clock_(std::move(clock)),
+        reclaimer_(*arena_) {}
   ~Impl();
 
   [[nodiscard]] PathLookup paths() const { return {frames_, now_}; }
@@ -167,6 +172,7 @@ class Forest::Impl {
   void replace_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
 
+  const std::shared_ptr<Arena> arena_;
   Frames frames_;
   const Clock now_;  // for readers
   StampClock clock_ TFDUDE_GUARDED_BY(mutex_);
@@ -248,6 +254,7 @@ T& Forest::Impl::push(Head& head) {
   fresh->owner = old->owner;
   fresh->slot = old->slot;
   fresh->generation = old->generation;
+  fresh->attachment = old->attachment;
   reclaimer_.supersede(old);
   // Readers skip the fresh version by its number until commit(), so it may be filled in later.
   head.store(fresh, std::memory_order_release);

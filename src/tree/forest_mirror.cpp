@@ -25,8 +25,8 @@ void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& val
   if (value.process_noise->upper() == Covariance::Upper{}) return;
   EdgeTiming timing = default_timing_;
   timing.process_noise = *value.process_noise;
-  delete fresh.samples;  // no reader has seen it
-  fresh.samples = new SampleHistory(timing);
+  SampleHistory::destroy(fresh.samples);  // no reader has seen it
+  fresh.samples = SampleHistory::create(*arena_, timing).release();
 }
 
 bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& told,

@@ -5,10 +5,14 @@
 #include "tfdude/base/id.hpp"
 
 #include "tree/forest_impl.hpp"
+#include "tree/remote_forest.hpp"
 
 namespace tfdude {
 
-Forest::Forest(Clock clock) : impl_(std::make_unique<Impl>(std::move(clock))) {}
+Forest::Forest(Clock clock, std::shared_ptr<Arena> arena)
+    : impl_(std::make_unique<Impl>(std::move(clock), std::move(arena))) {
+  impl_->arena_->roots().layout = layout_hash();
+}
 Forest::~Forest() = default;
 
 namespace {
@@ -68,7 +72,7 @@ Result<std::vector<Segment>> Forest::segments(std::string_view a, std::string_vi
   std::vector<Segment> runs;
   const auto append = [&runs](const Version& edge, const Version& from, const Version& to) {
     if (runs.empty() || runs.back().owner != edge.owner) {
-      runs.push_back({edge.owner, from.name->text, {}});
+      runs.push_back({edge.owner, std::string(from.name->text), {}});
     }
     runs.back().to = to.name->text;
   };
@@ -155,7 +159,7 @@ Result<std::vector<std::string>> Forest::children(std::string_view id) const {
   }
   std::vector<std::string> ids;
   impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {
-    ids.push_back(impl_->frames_.newest(child).name->text);
+    ids.emplace_back(impl_->frames_.newest(child).name->text);
   });
   std::sort(ids.begin(), ids.end());
   return ids;

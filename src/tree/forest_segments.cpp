@@ -196,7 +196,7 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
       auto& with = found.correlations[i].observed_with;
-      with = {edge->name->text, edge->name->text};
+      with.assign(2, std::string(edge->name->text));
       const Correlation* row = found.stamp ? row_at(*edge, nanoseconds(*found.stamp)) : nullptr;
       if (row == nullptr) continue;
       std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),

@@ -120,7 +120,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
                                  std::int64_t stamp) {
   SampleHistory* samples = newest.samples;
   if (samples == nullptr) {
-    samples = new SampleHistory(default_timing_);
+    samples = SampleHistory::create(*arena_, default_timing_).release();
   } else if (samples->left_behind) {
     return begin_history(newest, value, stamp);
   } else {

@@ -65,6 +65,7 @@ void Forest::Impl::hang(Version& fresh, std::uint32_t parent) const {
 void Forest::Impl::relink(Version& fresh, std::uint32_t parent) {
   const std::uint32_t old_parent = fresh.parent;
   if (!fresh.present()) fresh.generation = next_generation();
+  fresh.attachment = next_generation();
   if (old_parent != kNoSlot) graph_.unlink(old_parent, fresh.slot);
   graph_.ensure(fresh.slot);
   if (parent != kNoSlot) {
@@ -82,6 +83,7 @@ void Forest::Impl::make_absent(std::uint32_t slot) {
     reclaimer_.supersede(frames_.newest_value(slot).correlation);
   }
   Version& fresh = push_remote(slot);
+  fresh.attachment = 0;
   const std::uint32_t parent = fresh.parent;
   if (parent != kNoSlot) graph_.unlink(parent, slot);
   hang(fresh, kNoSlot);
@@ -153,7 +155,9 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id) {
       *top, [&](std::uint32_t child) { return impl_->frames_.newest(child).held(); });
   std::vector<std::string> removed;
   removed.reserve(slots.size());
-  for (const std::uint32_t slot : slots) removed.push_back(impl_->frames_.newest(slot).name->text);
+  for (const std::uint32_t slot : slots) {
+    removed.emplace_back(impl_->frames_.newest(slot).name->text);
+  }
   for (auto slot = slots.rbegin(); slot != slots.rend(); ++slot) impl_->make_absent(*slot);
   impl_->commit_structure();
   return removed;

@@ -31,6 +31,8 @@ struct Ends {
 /// @par Thread safety  Readers need an epoch::Guard, but no lock; one writer at a time.
 class Frames {
  public:
+  explicit Frames(Arena& arena) : slots_(arena), ids_(arena), committed_(arena.roots().committed) {}
+
   // --- reading ---
 
   [[nodiscard]] std::uint64_t snapshot() const {
@@ -121,7 +123,7 @@ class Frames {
  private:
   SlotArray slots_;
   IdTable ids_;
-  std::atomic<std::uint64_t> committed_{0};
+  std::atomic<std::uint64_t>& committed_;
 };
 
 }  // namespace tfdude

@@ -2,10 +2,10 @@
 
 #include <atomic>
 #include <cstdint>
-#include <memory>
-#include <string>
 #include <string_view>
 #include <vector>
+
+#include "tree/arena.hpp"
 
 namespace tfdude {
 
@@ -28,30 +28,36 @@ struct Refused {
 class RefusedSamples {
  public:
   RefusedSamples() = default;
-  ~RefusedSamples() { delete counts_.load(std::memory_order_relaxed); }
+  ~RefusedSamples() { delete own(); }
   RefusedSamples(const RefusedSamples&) = delete;
   RefusedSamples& operator=(const RefusedSamples&) = delete;
 
   /// Null: none was rejected.
-  [[nodiscard]] const Refused* counts() const { return counts_.load(std::memory_order_acquire); }
+  [[nodiscard]] const Refused* counts() const {
+    return Veiled<Refused>::veiled_pointer(counts_.load(std::memory_order_acquire));
+  }
 
   /// To count one; for writers only.
   [[nodiscard]] Refused& more() {
-    Refused* counts = counts_.load(std::memory_order_relaxed);
+    Refused* counts = own();
     if (counts == nullptr) {
       counts = new Refused;
-      counts_.store(counts, std::memory_order_release);
+      counts_.store(Veiled<Refused>::veiled(counts), std::memory_order_release);
     }
     return *counts;
   }
 
   /// The next sample that is too old is the first one in a row; for writers only.
   void end_row() {
-    if (Refused* counts = counts_.load(std::memory_order_relaxed)) counts->behind = {};
+    if (Refused* counts = own()) counts->behind = {};
   }
 
  private:
-  std::atomic<Refused*> counts_{nullptr};
+  [[nodiscard]] Refused* own() const {
+    return Veiled<Refused>::veiled_pointer(counts_.load(std::memory_order_relaxed));
+  }
+
+  std::atomic<std::uintptr_t> counts_{0};
 };
 
 /// An interned id and its slot. Immutable once in the table, except for `lamport_time` and
@@ -61,7 +67,12 @@ struct Name {
   Name(std::string_view id, std::uint32_t hashed, std::uint32_t number)
       : text(id), hash(hashed), slot(number) {}
 
-  std::string text;
+  /// With its text behind it.
+  [[nodiscard]] static const Name* create(Arena& arena, std::string_view id, std::uint32_t hashed,
+                                          std::uint32_t number);
+  static void destroy(Arena& arena, const Name* name);
+
+  std::string_view text;
   std::uint32_t hash = 0;
   std::uint32_t slot = 0;
   /// When the frame got its parent. That of the newest commit, whichever a reader sees.
@@ -75,7 +86,7 @@ struct Name {
 /// at a time. Entries that a change makes unreachable wait in limbo until no reader can see them.
 class IdTable {
  public:
-  IdTable();
+  explicit IdTable(Arena& arena);
   ~IdTable();
   IdTable(const IdTable&) = delete;
   IdTable& operator=(const IdTable&) = delete;
@@ -92,23 +103,42 @@ class IdTable {
   /// a tag below safe_below.
   void collect(std::uint64_t tag, std::uint64_t safe_below);
 
- private:
+  /// The hash of an id in Name.
+  [[nodiscard]] static std::uint32_t hash_of(std::string_view id);
+
+  /// With its cells behind it.
   struct Table {
-    explicit Table(std::size_t capacity) : mask(capacity - 1), cells(capacity) {}
-    std::size_t mask;
-    std::vector<std::atomic<const Name*>> cells;
+    using Cell = std::atomic<const Name*>;
+
+    [[nodiscard]] std::size_t size() const { return mask + 1; }
+    [[nodiscard]] Cell* cells() {
+      return reinterpret_cast<Cell*>(this + 1);  // NOLINT(*-reinterpret-cast): see above
+    }
+
+    std::uint64_t mask = 0;
   };
+
+ private:
+  // Erased, and waiting until no reader can see it; one of both.
   struct Limbo {
     std::uint64_t tag;
-    std::unique_ptr<const Name> name;
-    std::unique_ptr<Table> table;
+    const Name* name;
+    Table* table;
   };
 
+  [[nodiscard]] Table* table() const {
+    return static_cast<Table*>(table_.load(std::memory_order_acquire));
+  }
+  [[nodiscard]] Table* new_table(std::size_t capacity);
+  void destroy(const Limbo& one);
   void grow();
   /// @return whether it took a cell that was never used
-  static bool place(Table& table, const Name* name);
+  bool place(Table& table, const Name* name) const;
 
-  std::atomic<Table*> table_;
+  Arena& arena_;
+  std::atomic<void*>& table_;
+  // Replaces an erased name, so that probing continues past it.
+  const Name* const tombstone_;
   std::size_t names_ = 0;
   std::size_t used_ = 0;  // names and tombstones
   std::vector<Limbo> limbo_;

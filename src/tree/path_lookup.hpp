@@ -78,18 +78,6 @@ class PathLookup {
   [[nodiscard]] tl::unexpected<Error> explain(Error&& error, const Ends& ends,
                                               const Query& query) const;
 
-  /// The walk that all lookups share. `take` gets the accumulation of an edge, and the edge, whose
-  /// value it adds. The walk stops at an error of `take`.
-  template <class Value, class Take>
-  [[nodiscard]] static Result<void> walk(const Ends& ends, Absent absent, Order order, Take take,
-                                         Value& X_AB);
-  template <class Value>
-  [[nodiscard]] static Result<void> walk_newest(const Ends& ends, Absent absent, Order order,
-                                                Met& met, Value& X_AB);
-  template <class Value>
-  [[nodiscard]] static Result<void> walk_at(const Ends& ends, Absent absent, const Instant& at,
-                                            const Query& query, Met& met, Value& X_AB);
-
   const Frames& frames_;
   const Forest::Clock& clock_;
 };

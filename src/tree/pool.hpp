@@ -1,12 +1,13 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
-#include <memory>
+#include <new>
 #include <vector>
+
+#include "tree/arena.hpp"
 
 namespace tfdude {
 
@@ -32,6 +33,16 @@ void prefetch_for_writing(const T* object) {
 template <class T>
 class Pool {
  public:
+  explicit Pool(Arena& arena) : arena_(arena) {}
+  ~Pool() {
+    for (T* block : blocks_) {
+      for (std::size_t i = 0; i < kBlock; ++i) block[i].~T();
+      arena_.release(block, kBlock * sizeof(T), alignof(T));
+    }
+  }
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+
   [[nodiscard]] T* take() {
     if (free_.empty()) grow();
     T* taken = free_.back();
@@ -51,12 +62,15 @@ class Pool {
   /// Call only between two commits. @param tag  from epoch::retire_tag()
   void collect(std::uint64_t tag, std::uint64_t safe_below) {
     if (retired_.empty() || retired_.back().end < superseded_.size()) {
-      retired_.push_back({tag, superseded_.size()});
+      retired_.push_back({tag, superseded_.size(), arena_.committed()});
     }
-    const auto seen = std::find_if(retired_.begin(), retired_.end(),
-                                   [=](const Retired& some) { return some.tag >= safe_below; });
+    const std::size_t kept = arena_.shared() ? kKept : 0;
+    const auto seen = std::find_if(retired_.begin(), retired_.end(), [&](const Retired& some) {
+      return some.tag >= safe_below || superseded_.size() - some.end < kept;
+    });
     if (seen == retired_.begin()) return;
     const std::size_t unseen = std::prev(seen)->end;
+    arena_.overwrite(std::prev(seen)->commit);
     const auto end = superseded_.begin() + static_cast<std::ptrdiff_t>(unseen);
     free_.insert(free_.end(), superseded_.begin(), end);
     superseded_.erase(superseded_.begin(), end);
@@ -65,20 +79,27 @@ class Pool {
   }
 
  private:
-  // The superseded objects before this one have this tag, or an earlier one. Tags do not decrease.
+  // The superseded objects before this one have this tag, or an earlier one, and were superseded by
+  // commits up to this one. Tags do not decrease.
   struct Retired {
     std::uint64_t tag;
     std::size_t end;
+    std::uint64_t commit;
   };
   static constexpr std::size_t kBlock = 16;
+  // How many of the objects that were superseded last are not reused yet, so that a reader in
+  // another process has the time in which so many are written.
+  static constexpr std::size_t kKept = 128;
 
   void grow() {
-    blocks_.push_back(std::make_unique<std::array<T, kBlock>>());
+    T* block = static_cast<T*>(arena_.allocate(kBlock * sizeof(T), alignof(T)));
+    blocks_.push_back(block);
     free_.reserve(blocks_.capacity() * kBlock);
-    for (T& object : *blocks_.back()) free_.push_back(&object);
+    for (std::size_t i = 0; i < kBlock; ++i) free_.push_back(new (block + i) T());
   }
 
-  std::vector<std::unique_ptr<std::array<T, kBlock>>> blocks_;
+  Arena& arena_;
+  std::vector<T*> blocks_;
   std::vector<T*> free_;
   std::vector<T*> superseded_;
   std::vector<Retired> retired_;

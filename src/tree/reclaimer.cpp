@@ -6,9 +6,9 @@
 
 namespace tfdude {
 
-template <class T>
-void Reclaimer::Waiting<T>::collect(std::uint64_t tag, std::uint64_t safe_below) {
-  for (std::unique_ptr<T>& one : superseded) {
+template <class T, class Pointer>
+void Reclaimer::Waiting<T, Pointer>::collect(std::uint64_t tag, std::uint64_t safe_below) {
+  for (Pointer& one : superseded) {
     if (one == nullptr) continue;
     one->retire_tag = tag;
     retired.push_back(std::move(one));

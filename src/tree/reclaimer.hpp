@@ -17,6 +17,8 @@ namespace tfdude {
 /// a time.
 class Reclaimer {
  public:
+  explicit Reclaimer(Arena& arena) : held_pool_(arena), remote_pool_(arena), samples_(arena) {}
+
   template <class T>
   [[nodiscard]] T* take() {
     if constexpr (std::is_same_v<T, HeldVersion>) {
@@ -57,10 +59,10 @@ class Reclaimer {
   // the first-level cache.
   static constexpr std::size_t kCollectAt = 64;
 
-  template <class T>
+  template <class T, class Pointer>
   struct Waiting {
-    std::vector<std::unique_ptr<T>> superseded;  // since the readers were last checked
-    std::vector<std::unique_ptr<T>> retired;     // with a tag
+    std::vector<Pointer> superseded;  // since the readers were last checked
+    std::vector<Pointer> retired;     // with a tag
 
     void collect(std::uint64_t tag, std::uint64_t safe_below);
   };
@@ -69,8 +71,8 @@ class Reclaimer {
   Pool<Version> remote_pool_;
   SampleStore samples_;
   std::size_t superseded_ = 0;  // versions, since the readers were last checked
-  Waiting<SampleHistory> histories_;
-  Waiting<EdgeCorrelation> correlations_;
+  Waiting<SampleHistory, SampleHistory::Pointer> histories_;
+  Waiting<EdgeCorrelation, std::unique_ptr<EdgeCorrelation>> correlations_;
 };
 
 }  // namespace tfdude

@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "tfdude/math/transform.hpp"
@@ -11,6 +10,7 @@
 
 #include "math/joint_state.hpp"
 #include "math/path_accumulation.hpp"
+#include "tree/arena.hpp"
 
 namespace tfdude {
 
@@ -43,7 +43,7 @@ struct SampleRevision {
 /// Three cache lines.
 struct alignas(64) SharedCovariance : SharedPart {
   StatedCovariance covariance;
-  std::unique_ptr<const SampleRevision> revision;  ///< null: as given
+  VeiledOwner<const SampleRevision> revision;  ///< null: as given
 };
 static_assert(sizeof(SharedCovariance) == 192);
 

@@ -1,6 +1,8 @@
 #include "tree/sample_history.hpp"
 
 #include <algorithm>
+#include <memory>
+#include <new>
 
 namespace tfdude {
 namespace {
@@ -9,60 +11,55 @@ constexpr std::uint64_t kSize = SampleChunk::kSize;
 
 }  // namespace
 
-SampleHistory::SampleHistory(const EdgeTiming& timing, std::uint64_t capacity)
+SampleHistory::SampleHistory(Arena& arena, const EdgeTiming& timing, std::uint64_t capacity)
     : timing_(timing),
       has_noise_(timing.process_noise.upper() != Covariance::Upper{}),
       mask_(capacity - 1),
-      chunks_(new std::atomic<SampleChunk*>[capacity]()) {}
+      arena_(&arena),
+      chunks_(static_cast<std::atomic<SampleChunk*>*>(
+          arena.allocate(capacity * sizeof(std::atomic<SampleChunk*>)))) {
+  std::uninitialized_value_construct_n(chunks_, capacity);
+}
+
+SampleHistory::Pointer SampleHistory::create(Arena& arena, const EdgeTiming& timing,
+                                             std::uint64_t capacity) {
+  return Pointer(new (arena.allocate(sizeof(SampleHistory)))
+                     SampleHistory(arena, timing, capacity));
+}
+
+void SampleHistory::destroy(SampleHistory* samples) {
+  if (samples == nullptr) return;
+  Arena& arena = *samples->arena_;
+  arena.release(samples->chunks_, (samples->mask_ + 1) * sizeof(samples->chunks_[0]));
+  samples->~SampleHistory();
+  arena.release(samples, sizeof(SampleHistory));
+}
 
 // A sample that is dropped meanwhile stays as it is until this reader has left. But another one may
 // take its place: it then counts as earlier than t.
 SampleHistory::Bracket SampleHistory::around(std::int64_t t, std::uint64_t newest,
                                              std::uint64_t& back) const {
-  // How far a guess may be off before bisection is faster.
-  constexpr int kSteps = 4;
-  std::uint64_t low = oldest();
-  std::uint64_t high = newest;
-  if (back > 0 && back <= high - low) {
-    const Sample* before = sample(high - back);
-    const Sample* after = sample(high - back + 1);
-    const bool both = before != nullptr && after != nullptr;
-    if (both && before->stamp <= t && t < after->stamp) return {before, after};
-  }
-  const Sample* before = sample(low);
-  const Sample* after = sample(high);
-  if (low >= high || after == nullptr || (before != nullptr && t < before->stamp)) return {};
-  std::uint64_t at = low;
-  if (before != nullptr) {
-    const double share =
-        static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
-    at += static_cast<std::uint64_t>(share * static_cast<double>(high - low));
-  }
-  for (int step = 0; high - low > 1; ++step) {
-    if (step >= kSteps) at = low + (high - low) / 2;
-    at = std::clamp(at, low + 1, high - 1);
-    const Sample* here = sample(at);
-    if (here == nullptr || here->stamp <= t) {
-      before = here;
-      low = at++;
-    } else {
-      after = here;
-      high = at--;
-    }
-  }
-  back = newest - low;
-  return before != nullptr ? Bracket{before, after} : Bracket{};
+  return samples_around(*this, t, newest, back);
 }
 
 std::int64_t SampleHistory::reach(std::uint64_t newest) const {
-  // An error of a sample is twice as many times as large there.
-  constexpr std::int64_t kMostIntervals = 100;
-  if (newest <= oldest() || made_up_end_.load(std::memory_order_relaxed) >= newest) return 0;
-  const Sample* before = sample(newest - 1);
-  const Sample* after = sample(newest);
-  if (before == nullptr || after == nullptr) return 0;
-  const std::int64_t interval = after->stamp - before->stamp;
-  return interval > INT64_MAX / kMostIntervals ? INT64_MAX : kMostIntervals * interval;
+  return extrapolation_reach(*this, newest, made_up_end());
+}
+
+std::uint64_t SampleHistory::layout() {
+  Arena arena;
+  const Pointer one = create(arena, {});
+  const auto place = [&one](const auto& field) {
+    // NOLINTNEXTLINE(*-reinterpret-cast): addresses only
+    return reinterpret_cast<std::uintptr_t>(&field) - reinterpret_cast<std::uintptr_t>(one.get());
+  };
+  std::uint64_t all = 0;
+  for (const std::uintptr_t at :
+       {place(one->timing_), place(one->has_noise_), place(one->mask_), place(one->first_),
+        place(one->made_up_end_), place(one->chunks_)}) {
+    all = all * 1024 + at;
+  }
+  return all;
 }
 
 bool SampleHistory::is_timed_since(std::int64_t t, std::uint64_t newest) const {
@@ -120,9 +117,8 @@ void SampleHistory::drop_all(SampleStore& store) const {
   }
 }
 
-std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
-                                                   std::uint64_t end) const {
-  std::unique_ptr<SampleHistory> copy(new SampleHistory(timing_, capacity));
+SampleHistory::Pointer SampleHistory::copy(std::uint64_t capacity, std::uint64_t end) const {
+  Pointer copy = create(*arena_, timing_, capacity);
   const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
   copy->left_behind = left_behind;
@@ -136,10 +132,10 @@ std::unique_ptr<SampleHistory> SampleHistory::copy(std::uint64_t capacity,
   return copy;
 }
 
-std::unique_ptr<SampleHistory> SampleHistory::grown() const { return copy(2 * (mask_ + 1), next_); }
+SampleHistory::Pointer SampleHistory::grown() const { return copy(2 * (mask_ + 1), next_); }
 
-std::unique_ptr<SampleHistory> SampleHistory::with(const Sample& sample, std::uint64_t place,
-                                                   SampleStore& store) const {
+SampleHistory::Pointer SampleHistory::with(const Sample& sample, std::uint64_t place,
+                                           SampleStore& store) const {
   auto with_one = copy(full() ? 2 * (mask_ + 1) : mask_ + 1, place - place % kSize);
   if (place < made_up_end_.load(std::memory_order_relaxed)) ++with_one->made_up_end_;
   for (std::uint64_t number = with_one->next_; number < next_; ++number) {
@@ -151,8 +147,8 @@ std::unique_ptr<SampleHistory> SampleHistory::with(const Sample& sample, std::ui
   return with_one;
 }
 
-std::unique_ptr<SampleHistory> SampleHistory::replaced(const Sample& sample, std::uint64_t place,
-                                                       SampleStore& store) const {
+SampleHistory::Pointer SampleHistory::replaced(const Sample& sample, std::uint64_t place,
+                                               SampleStore& store) const {
   auto with_other = copy(mask_ + 1, next_);
   SampleChunk* fresh = store.take_chunk();
   *fresh = *chunk(place);

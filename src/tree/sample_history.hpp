@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -28,7 +29,18 @@ class SampleHistory {
     const Sample* after = nullptr;
   };
 
-  explicit SampleHistory(const EdgeTiming& timing) : SampleHistory(timing, kFirstCapacity) {}
+  /// Destroys a history, and releases its memory. Null: does nothing.
+  static void destroy(SampleHistory* samples);
+  struct Destroy {
+    void operator()(SampleHistory* samples) const { destroy(samples); }
+  };
+  using Pointer = std::unique_ptr<SampleHistory, Destroy>;
+
+  [[nodiscard]] static Pointer create(Arena& arena, const EdgeTiming& timing) {
+    return create(arena, timing, kFirstCapacity);
+  }
+  SampleHistory(const SampleHistory&) = delete;
+  SampleHistory& operator=(const SampleHistory&) = delete;
 
   [[nodiscard]] const EdgeTiming& timing() const { return timing_; }
   [[nodiscard]] bool has_noise() const { return has_noise_; }
@@ -48,6 +60,10 @@ class SampleHistory {
   /// samples that the reader sees carry it. 0: it cannot be, as there is only one, or as the owner
   /// has made up a stamp of them.
   [[nodiscard]] std::int64_t reach(std::uint64_t newest) const;
+  /// The number after the newest sample whose stamp the owner has made up; 0: there is none.
+  [[nodiscard]] std::uint64_t made_up_end() const {
+    return made_up_end_.load(std::memory_order_relaxed);
+  }
 
   /// Whether what the edge did around an instant, up to its newest sample, is known by stamps that
   /// came with the samples.
@@ -72,6 +88,13 @@ class SampleHistory {
     return found != nullptr && oldest() <= number ? found->stamp : kAlways;
   }
   [[nodiscard]] std::uint64_t oldest() const { return first_.load(std::memory_order_acquire); }
+
+  // --- for readers in other processes, of which each has its own addresses
+
+  [[nodiscard]] const std::uint64_t& mask() const { return mask_; }
+  [[nodiscard]] std::atomic<SampleChunk*>* const& chunks() const { return chunks_; }
+  /// A number that differs if the fields have other places.
+  [[nodiscard]] static std::uint64_t layout();
 
   /// Its memory, without samples.
   [[nodiscard]] std::size_t bytes() const {
@@ -137,15 +160,14 @@ class SampleHistory {
   void drop_all(SampleStore& store) const;
 
   /// A copy with room for twice as many samples.
-  [[nodiscard]] std::unique_ptr<SampleHistory> grown() const;
+  [[nodiscard]] Pointer grown() const;
 
   /// A copy with one more sample, inserted at `place`, which is not after the newest.
-  [[nodiscard]] std::unique_ptr<SampleHistory> with(const Sample& sample, std::uint64_t place,
-                                                    SampleStore& store) const;
+  [[nodiscard]] Pointer with(const Sample& sample, std::uint64_t place, SampleStore& store) const;
 
   /// A copy in which `sample` replaces one with the same stamp.
-  [[nodiscard]] std::unique_ptr<SampleHistory> replaced(const Sample& sample, std::uint64_t place,
-                                                        SampleStore& store) const;
+  [[nodiscard]] Pointer replaced(const Sample& sample, std::uint64_t place,
+                                 SampleStore& store) const;
 
   /// Replaces a sample that no reader can see yet.
   void rewrite(const Sample& sample, std::uint64_t place) {
@@ -165,10 +187,12 @@ class SampleHistory {
  private:
   static constexpr std::uint64_t kFirstCapacity = 2;
 
-  SampleHistory(const EdgeTiming& timing, std::uint64_t capacity);
+  [[nodiscard]] static Pointer create(Arena& arena, const EdgeTiming& timing,
+                                      std::uint64_t capacity);
+  SampleHistory(Arena& arena, const EdgeTiming& timing, std::uint64_t capacity);
+  ~SampleHistory() = default;
   // A copy that shares the chunks of the samples before this one; they must end there.
-  [[nodiscard]] std::unique_ptr<SampleHistory> copy(std::uint64_t capacity,
-                                                    std::uint64_t end) const;
+  [[nodiscard]] Pointer copy(std::uint64_t capacity, std::uint64_t end) const;
   [[nodiscard]] SampleChunk* chunk(std::uint64_t number) const {
     return chunks_[(number / SampleChunk::kSize) & mask_].load(std::memory_order_relaxed);
   }
@@ -218,8 +242,64 @@ class SampleHistory {
   std::atomic<std::uint64_t> made_up_end_{0};
   std::uint64_t next_ = 0;
   Ends ends_;
-  // NOLINTNEXTLINE(modernize-avoid-c-arrays): atomics cannot be moved
-  std::unique_ptr<std::atomic<SampleChunk*>[]> chunks_;
+  const Veiled<Arena> arena_;
+  std::atomic<SampleChunk*>* const chunks_;
 };
+
+/// As SampleHistory::around(), of samples that may be in the memory of another process.
+template <class Samples>
+SampleHistory::Bracket samples_around(const Samples& samples, std::int64_t t, std::uint64_t newest,
+                                      std::uint64_t& back) {
+  // How far a guess may be off before bisection is faster.
+  constexpr int kSteps = 4;
+  std::uint64_t low = samples.oldest();
+  std::uint64_t high = newest;
+  if (back > 0 && back <= high - low) {
+    const Sample* before = samples.sample(high - back);
+    const Sample* after = samples.sample(high - back + 1);
+    const bool both = before != nullptr && after != nullptr;
+    if (both && before->stamp <= t && t < after->stamp) return {before, after};
+  }
+  const Sample* before = samples.sample(low);
+  const Sample* after = samples.sample(high);
+  if (low >= high || after == nullptr || (before != nullptr && t < before->stamp)) return {};
+  std::uint64_t at = low;
+  if (before != nullptr) {
+    const double share =
+        static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
+    // Otherwise what another process has written makes no sense.
+    if (share >= 0 && share <= 1) {
+      at += static_cast<std::uint64_t>(share * static_cast<double>(high - low));
+    }
+  }
+  for (int step = 0; high - low > 1; ++step) {
+    if (step >= kSteps) at = low + (high - low) / 2;
+    at = std::clamp(at, low + 1, high - 1);
+    const Sample* here = samples.sample(at);
+    if (here == nullptr || here->stamp <= t) {
+      before = here;
+      low = at++;
+    } else {
+      after = here;
+      high = at--;
+    }
+  }
+  back = newest - low;
+  return before != nullptr ? SampleHistory::Bracket{before, after} : SampleHistory::Bracket{};
+}
+
+/// As SampleHistory::reach(), likewise.
+template <class Samples>
+std::int64_t extrapolation_reach(const Samples& samples, std::uint64_t newest,
+                                 std::uint64_t made_up_end) {
+  // An error of a sample is twice as many times as large there.
+  constexpr std::int64_t kMostIntervals = 100;
+  if (newest <= samples.oldest() || made_up_end >= newest) return 0;
+  const Sample* before = samples.sample(newest - 1);
+  const Sample* after = samples.sample(newest);
+  if (before == nullptr || after == nullptr) return 0;
+  const std::int64_t interval = after->stamp - before->stamp;
+  return interval > INT64_MAX / kMostIntervals ? INT64_MAX : kMostIntervals * interval;
+}
 
 }  // namespace tfdude

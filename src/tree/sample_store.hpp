@@ -11,6 +11,11 @@ namespace tfdude {
 /// The memory of the samples of all histories. One writer at a time.
 class SampleStore {
  public:
+  explicit SampleStore(Arena& arena)
+      : arena_(arena), chunks_(arena), covariances_(arena), joints_(arena) {}
+
+  [[nodiscard]] Arena& arena() { return arena_; }
+
   [[nodiscard]] SampleChunk* take_chunk() {
     bytes_ += sizeof(SampleChunk);
     return chunks_.take();
@@ -48,6 +53,7 @@ class SampleStore {
   [[nodiscard]] const SharedPart* fresh_part(const GivenValue& value);
   void supersede(const SharedPart* shared);
 
+  Arena& arena_;
   Pool<SampleChunk> chunks_;
   Pool<SharedCovariance> covariances_;
   Pool<SharedJoint> joints_;

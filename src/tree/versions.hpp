@@ -3,9 +3,11 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <memory>
 
 #include "tfdude/math/transform.hpp"
 
+#include "tree/arena.hpp"
 #include "tree/epoch.hpp"
 #include "tree/forest.hpp"
 #include "tree/id_table.hpp"
@@ -32,6 +34,9 @@ struct Version {
   std::uint32_t slot = kNoSlot;
   // Identifies the frame: a new number whenever one appears, even under the same name.
   std::uint32_t generation = 0;
+  // Identifies the edge: a new number whenever the frame appears, gets another parent, or another
+  // owner. 0: there is none.
+  std::uint32_t attachment = 0;
 
   /// The depth of a slot that others name as their parent, while that frame does not exist.
   static constexpr std::int32_t kAbsent = -1;
@@ -52,8 +57,8 @@ struct EdgeCorrelation {
 /// A version of an edge whose value is held here. The fields are ordered for lookups: a climb needs
 /// the first two cache lines, which end with the pose, and then the covariance.
 struct alignas(64) HeldVersion : Version {
-  std::int64_t stamp = kAlways;            // of the newest sample
-  EdgeCorrelation* correlation = nullptr;  // null: independent
+  std::int64_t stamp = kAlways;         // of the newest sample
+  Veiled<EdgeCorrelation> correlation;  // null: independent
   Transform X_PC;
   std::uint64_t number = 0;          // of the newest sample in the history
   SampleHistory* samples = nullptr;  // null: no history and no timing of its own
@@ -75,9 +80,15 @@ struct alignas(64) HeldVersion : Version {
 /// holds 1024 · 2^k slots.
 class SlotArray {
  public:
-  SlotArray() = default;
+  static constexpr int kFirstBits = 10;
+  static constexpr std::uint32_t kFirst = 1U << kFirstBits;
+
+  explicit SlotArray(Arena& arena) : arena_(arena), segments_(arena.roots().heads) {}
   ~SlotArray() {
-    for (auto& segment : segments_) delete[] segment.load(std::memory_order_relaxed);
+    for (std::size_t k = 0; k < segments_.size(); ++k) {
+      void* heads = segments_[k].load(std::memory_order_relaxed);
+      if (heads != nullptr) arena_.release(heads, sizeof(Head) * (std::size_t{kFirst} << k));
+    }
   }
   SlotArray(const SlotArray&) = delete;
   SlotArray& operator=(const SlotArray&) = delete;
@@ -85,7 +96,8 @@ class SlotArray {
   [[nodiscard]] Head& operator[](std::uint32_t slot) const {
     const std::uint32_t biased = slot + kFirst;
     const int segment = 31 - __builtin_clz(biased) - kFirstBits;
-    Head* heads = segments_[static_cast<std::size_t>(segment)].load(std::memory_order_acquire);
+    auto* heads = static_cast<Head*>(
+        segments_[static_cast<std::size_t>(segment)].load(std::memory_order_acquire));
     return heads[biased - (kFirst << segment)];
   }
 
@@ -98,7 +110,10 @@ class SlotArray {
     const int segment = 31 - __builtin_clz(biased) - kFirstBits;
     auto& memory = segments_[static_cast<std::size_t>(segment)];
     if (memory.load(std::memory_order_relaxed) == nullptr) {
-      memory.store(new Head[kFirst << segment](), std::memory_order_release);
+      const std::size_t count = std::size_t{kFirst} << static_cast<unsigned>(segment);
+      auto* heads = static_cast<Head*>(arena_.allocate(sizeof(Head) * count));
+      std::uninitialized_value_construct_n(heads, count);
+      memory.store(heads, std::memory_order_release);
     }
     first->slot = slot;
     (*this)[slot].store(first, std::memory_order_release);
@@ -107,9 +122,8 @@ class SlotArray {
   }
 
  private:
-  static constexpr int kFirstBits = 10;
-  static constexpr std::uint32_t kFirst = 1U << kFirstBits;
-  std::array<std::atomic<Head*>, 22> segments_{};
+  Arena& arena_;
+  std::array<std::atomic<void*>, SharedRoots::kMostHeads>& segments_;
   std::atomic<std::uint32_t> size_{0};
 };
 

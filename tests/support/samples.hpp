@@ -141,6 +141,7 @@ bool take(const Bytes& bytes) {
       {32, "base",
        FramesRequest{{}, {"arm", "left_*"}, {{"arms", 18446744073709551615ULL}, {"legs", 1}}}},
       {33, "arm", DescriptionRequest{18446744073709551615ULL}},
+      {34, "arm", MemoryRequest{}},
       {40, "hand", AddRequest{"arm", unspecified(random), 1}},
       {41, "hand",
        UpdateRequest{{{"hand", unspecified(random)}, {"arm", unspecified(random)}}, time_of(1)}},
@@ -245,7 +246,9 @@ bool take(const Bytes& bytes) {
       {15, 1, incomplete_values(random, false)},
       {16, 1, incomplete_values(random, true)},
       {17, 1, DescriptionPart{18446744073709551615ULL, 1, std::string(kMaxDescriptionPart, '<')}},
-      {18, 1, DescriptionPart{7, 8, "<robot/>"}}};
+      {18, 1, DescriptionPart{7, 8, "<robot/>"}},
+      {19, 1, MemoryOffer{"kernel", "socket", {18446744073709551615ULL, 2}, 3, 4, ""}},
+      {20, 1, MemoryOffer{"", "", {}, 0, 0, "there is no memfd"}}};
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {

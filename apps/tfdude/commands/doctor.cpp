@@ -15,6 +15,10 @@ json met_json(const Met& met) {
   json object{{"partition", met.partition.name}, {"host", met.partition.host},
               {"pid", met.partition.pid},        {"reachable", met.partition.reachable},
               {"clock_ahead_s", nullptr},        {"clock_error_s", nullptr}};
+  if (met.partition.reachable) {
+    object["in_memory"] = met.partition.in_memory;
+    object["why_not_in_memory"] = met.partition.why_not_in_memory;
+  }
   if (met.clock) {
     object["clock_ahead_s"] = seconds(met.clock->ahead);
     object["clock_error_s"] = seconds(met.clock->error);
@@ -33,6 +37,10 @@ std::string met_text(const Met& met) {
   if (met.clock) {
     text += format(", clock %+.3f ms (±%.3f)", 1e3 * seconds(met.clock->ahead),
                    1e3 * seconds(met.clock->error));
+  }
+  if (partition.in_memory) text += ", read in its memory";
+  if (!partition.why_not_in_memory.empty()) {
+    text += ", asked over DDS: " + partition.why_not_in_memory;
   }
   return text + "\n";
 }

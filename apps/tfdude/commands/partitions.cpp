@@ -45,6 +45,10 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
       continue;
     }
     if (partition.clock == ClockKind::kExternal) text += "  external clock\n";
+    if (partition.in_memory) text += "  lookups read its memory\n";
+    if (!partition.why_not_in_memory.empty() && partition.reachable) {
+      text += "  lookups ask it over DDS: " + partition.why_not_in_memory + "\n";
+    }
     if (partition.reachable) continue;
     text += painted(partition.stopped ? Look::kWarning : Look::kBad,
                     (partition.stopped ? "  stopped since " : "  lost since ") +
@@ -59,6 +63,7 @@ struct Partitions final : PlainCommand {
   using PlainCommand::PlainCommand;
 
   int ask(Client& client, const Common& common) const override {
+    client.find_memory();
     const auto partitions = client.partitions();
     if (!partitions) return report(partitions.error(), common);
     const int status = check_partitions(client, common, !partitions->empty());
@@ -69,6 +74,10 @@ struct Partitions final : PlainCommand {
       json.push_back(partition_json(partition));
       rows.push_back({partition, std::nullopt});
       if (!partition.reachable) continue;
+      json.back()["in_memory"] = partition.in_memory;
+      if (!partition.why_not_in_memory.empty()) {
+        json.back()["why_not_in_memory"] = partition.why_not_in_memory;
+      }
       if (const auto histories = client.histories(partition.name)) {
         const HistorySum sum = sum_of(*histories);
         json.back()["moving"] = sum.edges;

@@ -43,6 +43,7 @@ void read_own_sockets(Facts& facts) {
 }
 
 void ask_domain(Client& client, Facts& facts) {
+  client.find_memory();
   auto partitions = client.partitions();
   if (!partitions) {
     facts.failed = std::move(partitions.error());

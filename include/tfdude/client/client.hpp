@@ -392,6 +392,10 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<std::vector<Frame>> frames();
   /// All partitions, including unreachable ones, sorted by name.
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
+  /// Asks all reachable partitions whether their memory can be read from here, as the first lookup
+  /// of one of their frames does in the background: so partitions() tells it, and the next lookup
+  /// reads it. Waits at most for Options::timeout for each that does not answer. O(partitions).
+  void find_memory();
 
   /// Calls a function for each later change of the structure: partitions that come or go, frames
   /// added, removed or moved, conflicts. What this participant already knows is not reported. One

@@ -26,6 +26,8 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 [[nodiscard]] TFDUDE_EXPORT std::string profile_of_environment();
 /// The directory of keys in the environment's TFDUDE_KEYS, else empty.
 [[nodiscard]] TFDUDE_EXPORT std::string keys_of_environment();
+/// False if the environment's TFDUDE_SHARED_MEMORY is "off".
+[[nodiscard]] TFDUDE_EXPORT bool shared_memory_of_environment();
 
 /// How much others can make a Node keep. What would exceed it is rejected with kTooMuch, except
 /// samples.
@@ -100,6 +102,10 @@ struct Options {
   /// Maximum time that the destructor of a client waits until the values it has streamed (publish,
   /// publish_joints) are acknowledged, as flush() does; at most `timeout`.
   Milliseconds linger{100};
+  /// Whether lookups read frames of other processes of this computer in the memory of those, and
+  /// those read a Node's frames in its memory (docs/memory.md). Where that is not possible, owners
+  /// are asked over DDS.
+  bool shared_memory = shared_memory_of_environment();
 };
 
 /// How to watch a path.

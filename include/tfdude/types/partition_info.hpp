@@ -22,6 +22,9 @@ struct PartitionInfo {
   std::string program{};  ///< the version of its program; empty: not known
   ProtocolVersion protocol = kProtocolVersion;
   std::optional<ClockKind> clock{};  ///< that its stamps are of; absent: not known (yet)
+  bool in_memory =
+      false;  ///< lookups read its frames in its memory; otherwise they ask it over DDS
+  std::string why_not_in_memory{};  ///< a sentence without its end; empty: they do, or it is own
 
   /// Whether its protocol is understood here. If not, only its name and versions are known.
   [[nodiscard]] bool compatible() const { return protocol.major == kProtocolVersion.major; }

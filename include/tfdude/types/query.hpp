@@ -78,7 +78,7 @@ struct Observed {
   /// Edges that were correlated with those of the path, and are not any more: too many were
   /// (kMaxObservedTogether), and these the least.
   std::vector<std::string> forgotten;
-  std::optional<Time> stamp;           ///< of the corrected dynamic edges
+  std::optional<Time> stamp;  ///< of the corrected dynamic edges
 };
 
 }  // namespace tfdude

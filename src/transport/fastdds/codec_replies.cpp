@@ -182,6 +182,29 @@ constexpr auto kDescription =
     record(TFDUDE_FIELD(size, size, Count64()), TFDUDE_FIELD(hash, hash, Count64()),
            TFDUDE_FIELD(text, text, LongText{kMaxDescriptionPart}));
 
+// ---- memory
+
+template <std::size_t part>
+struct TokenPart : Count64 {
+  static void write(const std::array<std::uint64_t, 2>& token, std::uint64_t& wire) {
+    wire = token[part];
+  }
+  static Result<void> read(std::uint64_t wire, std::array<std::uint64_t, 2>& token, const Place&) {
+    token[part] = wire;
+    return {};
+  }
+};
+
+constexpr std::size_t kMaxSocketName = 255;
+
+constexpr auto kMemory = record(TFDUDE_FIELD(token_first, token, TokenPart<0>()),
+                                TFDUDE_FIELD(token_second, token, TokenPart<1>()),
+                                TFDUDE_FIELD(layout, layout, Count64()),
+                                TFDUDE_FIELD(incarnation, incarnation, Count64()),
+                                TFDUDE_FIELD(kernel, kernel, LongText{kMaxSocketName}),
+                                TFDUDE_FIELD(at_socket, socket, LongText{kMaxSocketName}),
+                                TFDUDE_FIELD(why_not, why_not, ErrorText{{kMaxMessage}}));
+
 // ---- all of them
 
 constexpr auto kBody =
@@ -196,7 +219,8 @@ constexpr auto kBody =
           TFDUDE_CASE(9, std::vector<JointInfo>, joint_states, FirstOf(List(kJoint))),
           SignOfLife<kAlive>(), TFDUDE_CASE(11, std::vector<KnownFrame>, structure, List(kFrame)),
           TFDUDE_CASE(12, SegmentValues, incomplete, kIncomplete),
-          TFDUDE_CASE(13, DescriptionPart, description, kDescription));
+          TFDUDE_CASE(13, DescriptionPart, description, kDescription),
+          TFDUDE_CASE(14, MemoryOffer, memory, kMemory));
 
 constexpr auto kReply = record(
     TFDUDE_FIELD(epoch, epoch, Count64()), TFDUDE_FIELD(lamport_time, lamport_time, Count64()),

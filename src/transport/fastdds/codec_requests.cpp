@@ -176,6 +176,12 @@ constexpr auto kFrames =
 
 constexpr auto kDescription = record(TFDUDE_FIELDS(from, Count64()));
 
+// The request has no fields.
+struct MemoryOctet : Octet {
+  static void write(const MemoryRequest&, std::uint8_t& wire) { wire = 0; }
+  static Result<void> read(std::uint8_t, MemoryRequest&, const Place&) { return {}; }
+};
+
 // ---- all of them
 
 constexpr auto kBody = cases(
@@ -194,7 +200,8 @@ constexpr auto kBody = cases(
     TFDUDE_CASE(15, PartialUpdateRequest, partial_update, kPartialUpdate),
     TFDUDE_CASE(16, ForgetRequest, forget, kForget), SignOfLife<kProbe>(),
     TFDUDE_CASE(18, FramesRequest, structure, kFrames),
-    TFDUDE_CASE(19, DescriptionRequest, description, kDescription));
+    TFDUDE_CASE(19, DescriptionRequest, description, kDescription),
+    TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

@@ -113,6 +113,14 @@ TEST_CASE("replies are decoded as they were encoded") {
       CHECK(came.size == part->size);
       CHECK(came.hash == part->hash);
       CHECK(came.text == part->text);
+    } else if (const auto* offer = std::get_if<MemoryOffer>(&one.body)) {
+      const auto& came = std::get<MemoryOffer>(arrived->body);
+      CHECK(came.kernel == offer->kernel);
+      CHECK(came.socket == offer->socket);
+      CHECK(came.token == offer->token);
+      CHECK(came.layout == offer->layout);
+      CHECK(came.incarnation == offer->incarnation);
+      CHECK(came.why_not == offer->why_not);
     }
   }
 }

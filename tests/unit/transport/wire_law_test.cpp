@@ -151,6 +151,7 @@ std::vector<Request> random_requests(Random& random) {
                       return SeenEpoch{random_name(random), random_count(random)};
                     })});
   add(DescriptionRequest{random_count(random)});
+  add(MemoryRequest{});
   return all;
 }
 
@@ -226,6 +227,12 @@ std::vector<Reply> random_replies(Random& random) {
                       "robot"};
   }));
   add(DescriptionPart{count(), count(), random_name(random)});
+  add(MemoryOffer{random_name(random),
+                  random_name(random),
+                  {count(), count()},
+                  count(),
+                  count(),
+                  random_name(random)});
   return all;
 }
 

@@ -15,7 +15,7 @@ const EdgeTiming kTiming;
 
 // Sample n has the stamp 10 n.
 struct Filled {
-  explicit Filled(std::uint64_t count) : history(std::make_unique<SampleHistory>(kTiming)) {
+  explicit Filled(std::uint64_t count) : history(SampleHistory::create(arena, kTiming)) {
     while (history->next() < count) append();
   }
   void append() {
@@ -24,8 +24,9 @@ struct Filled {
     history->append(10 * n, 1, {along_x(static_cast<double>(n))}, store);
   }
 
-  SampleStore store;
-  std::unique_ptr<SampleHistory> history;
+  Arena arena;
+  SampleStore store{arena};
+  SampleHistory::Pointer history;
 };
 
 }  // namespace

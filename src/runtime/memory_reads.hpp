@@ -1,0 +1,122 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/types/partition_info.hpp"
+#include "tfdude/types/query.hpp"
+
+#include "base/loop.hpp"
+#include "base/mutex.hpp"
+#include "partition/routing.hpp"
+#include "runtime/context.hpp"
+#include "runtime/member_runner.hpp"
+#include "runtime/process_memory.hpp"
+#include "tree/forest.hpp"
+#include "tree/remote_edges.hpp"
+
+namespace tfdude {
+
+/// Lookups in the memory of owners on this computer, and the offer of the own memory to others.
+///
+/// An owner whose frames were looked up over DDS is asked where its memory is, by a thread in the
+/// background. From then on lookups read it, as long as this process counts the owner as reachable.
+/// Whatever they cannot answer from memory goes over DDS, with all its errors.
+/// @par Thread safety  All functions are thread-safe. Lookups take no lock, except to bind edges of
+///   a path that is new or has changed.
+class MemoryReads {
+ public:
+  MemoryReads(const Context& context, ProcessMemory& memory);
+  ~MemoryReads() { stop(); }
+  MemoryReads(const MemoryReads&) = delete;
+  MemoryReads& operator=(const MemoryReads&) = delete;
+
+  /// After it has returned, nothing runs in the background, and the own memory is not offered.
+  void stop();
+
+  // --- reading
+
+  /// X_AB, if all edges are own or can be read; otherwise an error that says nothing.
+  template <class Name>
+  [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
+    return read(a, b, [&] { return structure_.forest.lookup(a, b, edges_); });
+  }
+  template <class Name>
+  [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
+    return read(a, b, [&] { return structure_.forest.lookup_pose(a, b, edges_); });
+  }
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
+    // The age of an instant is a difference of two times, which must be of one clock.
+    if (query.age_noise_until && other_clocks_.load(std::memory_order_relaxed)) {
+      return fail(Errc::kUnsupported, {});
+    }
+    return read(a, b, [&] { return structure_.forest.lookup(a, b, query, edges_); });
+  }
+  /// Whether there is anything to read.
+  [[nodiscard]] bool any() const { return edges_.any() && !member_.out(); }
+
+  /// Owners were asked over DDS for parts of a lookup.
+  void asked(const std::vector<Part>& parts);
+  /// What a plan would find has changed.
+  void look_again();
+  /// Finds out where the memory of all reachable owners is, on this thread.
+  void find_all();
+  /// Says of each partition how its frames are looked up.
+  void tell(std::vector<PartitionInfo>& partitions) const;
+
+  // --- being read
+
+  /// The reply to a MemoryRequest. @param incarnation  of the own partition
+  [[nodiscard]] Reply answer(const Request& request, std::uint64_t incarnation);
+
+ private:
+  using Clock = Loop::Clock;
+
+  struct Known {
+    enum class State { kWanted, kAttached, kRefused };
+    State state = State::kWanted;
+    std::uint64_t incarnation = 0;
+    std::string why_not;
+    Clock::time_point since = Clock::now();
+  };
+
+  template <class Name, class Look>
+  [[nodiscard]] auto read(Name a, Name b, Look look) -> decltype(look()) {
+    auto X_AB = look();
+    const bool unbound = !X_AB && X_AB.error().code == Errc::kNotOwner;
+    if (unbound && structure_.forest.bind(a, b, edges_) > 0) X_AB = look();
+    return X_AB;
+  }
+
+  [[nodiscard]] Clock::time_point run();
+  void attach_wanted();
+  void attach(Owner owner) TFDUDE_REQUIRES(attaching_);
+  [[nodiscard]] Result<MemoryOffer> offer_of(const std::string& partition);
+  void renew();
+  void note(Owner owner, std::optional<Known> known);
+  void end(Owner owner, std::uint64_t incarnation, bool died);
+
+  Structure& structure_;
+  MemberRunner& member_;
+  Requests& requests_;
+  ProcessMemory& memory_;
+  const bool reads_;
+  const Milliseconds timeout_;
+  RemoteEdges edges_;
+  std::atomic<bool> other_clocks_{false};
+  mutable Mutex mutex_{LockRank::kParts};
+  std::map<Owner, Known> owners_ TFDUDE_GUARDED_BY(mutex_);
+  Mutex offer_mutex_;
+  std::optional<MemoryOffer> offer_ TFDUDE_GUARDED_BY(offer_mutex_);
+  Mutex attaching_{LockRank::kSending};  // one owner after the other
+  Loop::Job job_;                        // last: it uses the other members
+};
+
+}  // namespace tfdude

@@ -1,0 +1,151 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "tfdude/base/result.hpp"
+
+#include "tree/frames.hpp"
+#include "tree/held_edge.hpp"
+
+namespace tfdude {
+
+/// A hash of what an owner and its readers must have in common: the sizes and places of all that a
+/// reader follows, and how ids are hashed. Others cannot read each other's memory.
+[[nodiscard]] std::uint64_t layout_hash();
+
+/// An edge in the memory of its owner.
+struct RemotePlace {
+  const Head* head = nullptr;
+  std::uint32_t attachment = 0;
+};
+
+/// The forest of another process, read in its memory (Arena). Writes nothing, takes no lock, and
+/// follows only pointers that stay in the memory, whatever that contains; all loops end. What was
+/// read is to be used only if intact() says so afterwards.
+/// @par Thread safety  All functions are thread-safe.
+class RemoteForest {
+ public:
+  /// @param memory  mapped here, aligned to 64, which outlives all that is read; its size must not
+  ///   shrink
+  /// @return kUnsupported: it is no such memory, or of another layout
+  [[nodiscard]] static Result<RemoteForest> open(const void* memory, std::size_t size);
+
+  /// The number of the newest commit.
+  [[nodiscard]] std::uint64_t snapshot() const {
+    return roots_->committed.load(std::memory_order_acquire);
+  }
+  /// Whether what was read since then, at that commit, was overwritten by nothing.
+  [[nodiscard]] bool intact(std::uint64_t snapshot) const {
+    std::atomic_thread_fence(std::memory_order_acquire);
+    return roots_->horizon.load(std::memory_order_relaxed) <= snapshot;
+  }
+
+  /// The edge from this frame to its parent at a commit. Empty if there is no such edge.
+  [[nodiscard]] std::optional<RemotePlace> find(std::string_view id, std::string_view parent,
+                                                std::uint64_t commit) const;
+
+  /// The edge at a commit; null if it is another one by now, or cannot be read.
+  [[nodiscard]] const HeldVersion* at(const RemotePlace& place, std::uint64_t commit) const {
+    const HeldVersion* newest =
+        here(static_cast<const HeldVersion*>(place.head->load(std::memory_order_acquire)));
+    if (newest != nullptr && load(newest->commit) <= commit && is(*newest, place)) return newest;
+    return older(place, commit);
+  }
+
+  /// An address of the owner as one of this process; null if no such object fits there.
+  template <class T>
+  [[nodiscard]] const T* here(const T* theirs, std::uint64_t count = 1) const {
+    // NOLINTNEXTLINE(*-reinterpret-cast): it is a number until it is checked; null is beyond the end
+    const std::uint64_t offset = reinterpret_cast<std::uint64_t>(theirs) - base_;
+    const std::uint64_t bytes = sizeof(T) * count;  // the callers limit the count
+    const bool fits = offset < size_ && bytes <= size_ - offset && offset % alignof(T) == 0;
+    // NOLINTNEXTLINE(*-reinterpret-cast): checked above
+    return fits ? reinterpret_cast<const T*>(memory_ + offset) : nullptr;
+  }
+
+  /// Once, and not again after it was checked: the memory may change at any time.
+  template <class T>
+  [[nodiscard]] static T load(const T& there) {
+    T once;
+    __atomic_load(&there, &once, __ATOMIC_RELAXED);
+    return once;
+  }
+
+ private:
+  RemoteForest(const SharedRoots& roots, std::size_t size)
+      // NOLINTNEXTLINE(*-reinterpret-cast): of bytes
+      : memory_(reinterpret_cast<const char*>(&roots)),
+        size_(size),
+        base_(roots.base),
+        roots_(&roots) {}
+
+  [[nodiscard]] static bool is(const Version& version, const RemotePlace& place) {
+    return load(version.attachment) == place.attachment && load(version.owner) == kHeldHere;
+  }
+  [[nodiscard]] const Version* at(const Head& head, std::uint64_t commit) const;
+  // As at(), if the newest version is not the one.
+  [[nodiscard]] const HeldVersion* older(const RemotePlace& place, std::uint64_t commit) const;
+  [[nodiscard]] const Head* head_of(std::uint32_t slot) const;
+  [[nodiscard]] std::string_view text_of(const Name* theirs) const;
+
+  const char* memory_;
+  std::size_t size_;
+  std::uint64_t base_;
+  const SharedRoots* roots_;
+};
+
+/// As OwnSamples, of an edge in the memory of its owner. What cannot be read counts as missing.
+class RemoteSamples {
+ public:
+  RemoteSamples(const RemoteForest& forest, const HeldVersion& edge);
+
+  [[nodiscard]] bool has_noise() const { return there() && samples_->has_noise(); }
+  [[nodiscard]] const Covariance& process_noise() const { return samples_->timing().process_noise; }
+  [[nodiscard]] std::uint64_t oldest() const { return there() ? samples_->oldest() : UINT64_MAX; }
+  [[nodiscard]] const Sample* sample(std::uint64_t number) const;
+  [[nodiscard]] SampleHistory::Bracket around(std::int64_t t, std::uint64_t newest,
+                                              std::uint64_t& back) const {
+    return there() ? samples_around(*this, t, newest, back) : SampleHistory::Bracket{};
+  }
+  [[nodiscard]] std::int64_t reach(std::uint64_t newest) const {
+    return there() ? extrapolation_reach(*this, newest, samples_->made_up_end()) : 0;
+  }
+  [[nodiscard]] bool given_parts(const Sample& sample, TransformParts& parts) const;
+  /// What samples refer to, copied, since it may change while it is used.
+  struct Copies {
+    struct One {
+      Sample sample;
+      std::variant<std::monostate, SharedCovariance, SharedJoint> shared;
+    };
+    One before;
+    One after;
+  };
+  [[nodiscard]] bool make_whole(SampleHistory::Bracket& samples, Copies& copies) const;
+
+ private:
+  [[nodiscard]] bool there() const { return chunks_ != nullptr; }
+  [[nodiscard]] bool copy(const Sample& sample, Copies::One& copy) const;
+
+  const RemoteForest& forest_;
+  const SampleHistory* samples_ = nullptr;
+  const std::atomic<SampleChunk*>* chunks_ = nullptr;
+  std::uint64_t mask_ = 0;
+};
+
+/// An edge in the memory of its owner, at a commit.
+struct RemoteEdge {
+  static constexpr bool kRemote = true;
+
+  const HeldVersion* version = nullptr;
+  const RemoteForest* forest = nullptr;
+
+  [[nodiscard]] RemoteSamples samples() const { return {*forest, *version}; }
+};
+
+}  // namespace tfdude

@@ -1,0 +1,191 @@
+// Lookups in the memory of daemons, compared with lookups over DDS.
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+#include "support/test_domain.hpp"
+#include "support/thesis.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::eventually;
+using testing::outcome;
+using testing::Random;
+using testing::ThesisDaemons;
+using testing::transform_diff;
+
+Time at_ms(std::int64_t ms) { return time_of(1'700'000'000'000'000'000 + ms * 1'000'000); }
+
+PartitionInfo partition(Client& client, const std::string& name) {
+  const auto all = client.partitions().value();
+  for (const PartitionInfo& one : all) {
+    if (one.name == name) return one;
+  }
+  return {};
+}
+
+bool all_in_memory(Client& client) {
+  client.find_memory();
+  const auto all = client.partitions().value();
+  return std::all_of(all.begin(), all.end(),
+                     [](const PartitionInfo& one) { return one.in_memory; });
+}
+
+// Two daemons, and two clients, of which the second asks over DDS.
+struct Two : ThesisDaemons {
+  Client memory = Client::open(domain.options()).value();
+  Client dds = Client::open([this] {
+                 Options options = domain.options();
+                 options.shared_memory = false;
+                 return options;
+               }())
+                   .value();
+};
+
+}  // namespace
+
+TEST_CASE("memory: the first lookup attaches the owner, and partitions() says so") {
+  Two d;
+  CHECK_FALSE(partition(d.memory, "arms").in_memory);
+  REQUIRE(eventually([&] { return d.memory.lookup("world", "hand_left").has_value(); }));
+  CHECK(eventually([&] { return partition(d.memory, "arms").in_memory; }));
+  CHECK(partition(d.memory, "arms").why_not_in_memory.empty());
+  REQUIRE(d.dds.lookup("world", "hand_left"));
+  CHECK(partition(d.dds, "arms").why_not_in_memory == "it is switched off here");
+  const auto shown = d.domain.cli({"partitions"});
+  CHECK_THAT(shown.out, testing::ContainsSubstring("lookups read its memory"));
+  const auto off = d.domain.cli({"--no-shared-memory", "partitions"});
+  CHECK_THAT(off.out,
+             testing::ContainsSubstring("lookups ask it over DDS: it is switched off here"));
+}
+
+TEST_CASE("memory: answers are those over DDS, and what was acknowledged is seen at once") {
+  Two d;
+  Random random(11);
+  INFO("seed " << random.seed());
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  std::vector<std::string> ids;
+  const auto frames = d.memory.frames().value();
+  for (const Frame& frame : frames) ids.push_back(frame.id);
+  const auto any = [&]() -> const std::string& { return ids[random.index(ids.size())]; };
+  std::int64_t now = 1000;
+  int made = 0;
+  int answers = 0;
+  for (int step = 0; step < 300; ++step) {
+    const std::string changed = any();
+    const std::size_t dice = random.index(20);
+    std::optional<Transform> written;
+    if (dice == 0) {
+      const std::string id = "new " + std::to_string(made++);
+      if (d.memory.add(id, changed, random.transform())) ids.push_back(id);
+    } else if (dice == 1) {
+      (void)d.memory.move(changed, any());
+    } else if (dice < 12) {
+      const Transform X = random.transform();
+      if (d.dds.update(changed, X, at_ms(now += 1 + static_cast<std::int64_t>(random.index(5))))) {
+        written = X;
+      }
+    } else {
+      const Transform X = random.transform();
+      const std::int64_t late = dice < 15 ? static_cast<std::int64_t>(random.index(30)) : 0;
+      (void)d.dds.update(changed, X, at_ms(now - late));
+    }
+    if (written) {
+      const auto parent = d.memory.parent(changed).value();
+      const auto seen = parent.empty() ? written : d.memory.lookup(parent, changed).value();
+      CHECK(transform_diff(*seen, *written, 1e-12) == "");
+    }
+    for (int i = 0; i < 3; ++i) {
+      const std::string a = any();
+      const std::string b = any();
+      Query query;
+      if (random.index(3) > 0) {
+        query.at = at_ms(now - 40 + static_cast<std::int64_t>(random.index(60)));
+      }
+      if (random.index(3) == 0) query.extrapolate = std::chrono::milliseconds(random.index(40));
+      if (random.index(5) == 0) query.order = Order::kFourth;
+      // The other client may not know the structure yet.
+      std::string differs;
+      CHECK(eventually([&] {
+        const auto found = d.memory.lookup(a, b, query);
+        const auto expected = d.dds.lookup(a, b, query);
+        differs = outcome(found) == outcome(expected) ? "" : outcome(found);
+        if (!found || !expected) return differs.empty();
+        differs = transform_diff(*found, *expected, 1e-9);
+        ++answers;
+        return differs.empty() && found->stamp == expected->stamp &&
+               found->basis.unspecified == expected->basis.unspecified;
+      }));
+      CHECK(differs == "");
+    }
+  }
+  CHECK(answers > 300);
+  CHECK(all_in_memory(d.memory));
+}
+
+TEST_CASE("memory: a killed owner is unreachable at once, and its next process is read again") {
+  Two d;
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  REQUIRE(d.memory.lookup("world", "hand_left"));
+  d.arms->kill();
+  const auto killed = std::chrono::steady_clock::now();
+  std::optional<Error> error;
+  while (!error) {
+    const auto asked = d.memory.lookup("world", "hand_left");
+    if (!asked) error = asked.error();
+  }
+  const auto known = std::chrono::steady_clock::now() - killed;
+  CAPTURE(std::chrono::duration<double, std::milli>(known).count());
+  CHECK(error->code == Errc::kUnreachable);
+  CHECK(known < std::chrono::milliseconds(300));  // 450 over DDS
+  d.arms.emplace(d.domain.serve(testing::kArmsFile));
+  REQUIRE(eventually([&] { return d.memory.lookup("world", "hand_left").has_value(); }));
+  CHECK(eventually([&] { return all_in_memory(d.memory); }));
+  REQUIRE(d.dds.update("hand_left", testing::along_x(3)));
+  const auto parent = d.memory.parent("hand_left").value();
+  CHECK(testing::x_of(d.memory.lookup(parent, "hand_left")) == 3);
+}
+
+TEST_CASE("memory: an owner that hangs is lost as over DDS, and is read again when it goes on") {
+  Two d;
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  d.arms->freeze();
+  REQUIRE(eventually([&] {
+    const auto asked = d.memory.lookup("world", "hand_left");
+    return !asked && asked.error().code == Errc::kUnreachable;
+  }));
+  d.arms->signal(SIGCONT);
+  REQUIRE(eventually([&] { return d.memory.lookup("world", "hand_left").has_value(); }));
+  CHECK(eventually([&] { return all_in_memory(d.memory); }));
+}
+
+TEST_CASE("memory: an owner that stops is not taken for a dead one") {
+  Two d;
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  d.arms->signal(SIGTERM);
+  REQUIRE(eventually([&] { return !partition(d.memory, "arms").reachable; }));
+  CHECK(partition(d.memory, "arms").stopped);
+}
+
+TEST_CASE("memory: an owner that lets nobody read is asked over DDS") {
+  testing::TestDomain domain;
+  auto arms = domain.start_daemon({"--config", testing::kArmsFile, "--no-shared-memory"});
+  testing::await_ready(arms);
+  auto client = Client::open(domain.options()).value();
+  REQUIRE(eventually([&] { return client.lookup("arm_1", "hand_left").has_value(); }));
+  CHECK(eventually(
+      [&] { return partition(client, "arms").why_not_in_memory == "it is switched off there"; }));
+}
+
+}  // namespace tfdude

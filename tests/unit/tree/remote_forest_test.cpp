@@ -1,0 +1,483 @@
+// Lookups in the memory of other owners, compared with those of one forest that holds all edges.
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/pose_diff.hpp"
+#include "support/random.hpp"
+#include "support/shared_forest.hpp"
+#include "tree/forest.hpp"
+#include "tree/remote_edges.hpp"
+
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::outcome;
+using testing::Random;
+using testing::SharedForest;
+using testing::transform_diff;
+using testing::x_of;
+
+constexpr Owner kOwners = 3;
+constexpr std::int64_t kMs = 1'000'000;
+
+Time at_ms(std::int64_t ms) { return time_of(ms * kMs); }
+
+// Looks up as a client does: binds the path if it is not bound.
+template <class Look>
+auto read(const Forest& forest, RemoteEdges& others, const std::string& a, const std::string& b,
+          Look look) {
+  auto found = look();
+  if (!found && found.error().code == Errc::kNotOwner && forest.bind(a, b, others) > 0) {
+    found = look();
+  }
+  return found;
+}
+
+// A reader that owns some frames, the owners of all others, and an oracle that holds all of them.
+class World {
+ public:
+  explicit World(Random& random) : random_(random) {
+    for (Owner owner = 1; owner <= kOwners; ++owner) {
+      owners_.push_back(std::make_unique<SharedForest>());
+      others_.attach(owner, owners_.back()->seen(), nullptr);
+    }
+    add("world", "", 0);
+  }
+
+  void step() {
+    const std::size_t dice = random_.index(100);
+    const std::string id = any_id();
+    if (dice < 15) {
+      add("f" + std::to_string(made_++), id, static_cast<Owner>(random_.index(kOwners + 1)));
+    } else if (dice < 20) {
+      remove(id);
+    } else if (dice < 27) {
+      move(id, any_id());
+    } else if (dice < 32) {
+      set_timing(id);
+    } else if (dice < 35) {
+      if (frame(id) != nullptr) correlate(id);
+    } else if (dice < 40) {
+      each_of(id, [&](Forest& forest) { return forest.clear_history(id); });
+    } else {
+      update(id);
+    }
+  }
+
+  /// What differs, or cannot be read although it could; "" if nothing.
+  std::string look() {
+    const std::string a = any_id();
+    const std::string b = any_id();
+    Query query;
+    if (random_.index(3) > 0)
+      query.at = at_ms(now_ - 40 + static_cast<std::int64_t>(random_.index(60)));
+    if (random_.index(3) == 0) query.extrapolate = std::chrono::milliseconds(random_.index(40));
+    if (random_.index(4) == 0) query.age_noise_until = at_ms(now_ + 50);
+    if (random_.index(5) == 0) query.order = Order::kFourth;
+    const std::string what = a + " " + b + ": ";
+    const bool correlated = has_correlation(a, b);
+    const auto newest = read(reader_, others_, a, b, [&] { return reader_.lookup(a, b, others_); });
+    if (auto wrong = differs(newest, oracle_.lookup(a, b), correlated); !wrong.empty()) {
+      return what + wrong;
+    }
+    const auto pose =
+        read(reader_, others_, a, b, [&] { return reader_.lookup_pose(a, b, others_); });
+    const auto expected_pose = oracle_.lookup_pose(a, b);
+    if (pose.has_value() && !expected_pose) return what + "a pose where there is none";
+    if (pose && !(pose->matrix() == expected_pose->matrix())) return what + "another pose";
+    const auto found =
+        read(reader_, others_, a, b, [&] { return reader_.lookup(a, b, query, others_); });
+    const auto expected = oracle_.lookup(a, b, query);
+    if (auto wrong = differs(found, expected, correlated); !wrong.empty()) return what + wrong;
+    if (found && found->stamp != expected->stamp) return what + "another stamp";
+    if (found && found->basis.unspecified != expected->basis.unspecified) {
+      return what + "other unspecified edges";
+    }
+    if (found) ++answered_;
+    if (found && found->stamp) ++dynamic_;
+    if (!found && expected) ++only_owners_;
+    return "";
+  }
+
+  [[nodiscard]] int answered() const { return answered_; }
+  [[nodiscard]] int dynamic() const { return dynamic_; }
+  [[nodiscard]] int only_owners() const { return only_owners_; }
+
+ private:
+  struct Frame {
+    std::string id;
+    std::string parent;
+    Owner owner;
+    bool correlated = false;
+  };
+
+  // The forest of an owner; 0 is the reader.
+  Forest& of(Owner owner) { return owner == 0 ? reader_ : owners_[owner - 1]->forest; }
+  // How the forest of one calls the other.
+  static Owner called(Owner whose, Owner other) {
+    return whose == other ? kHeldHere : other == 0 ? 9 : other;
+  }
+
+  Frame* frame(const std::string& id) {
+    for (Frame& one : frames_) {
+      if (one.id == id) return &one;
+    }
+    return nullptr;
+  }
+  std::string any_id() { return frames_[random_.index(frames_.size())].id; }
+
+  // Of the oracle, and of the owner.
+  template <class Change>
+  bool each_of(const std::string& id, Change change) {
+    Frame* found = frame(id);
+    if (found == nullptr) return false;
+    const auto expected = change(oracle_);
+    const auto done = change(of(found->owner));
+    REQUIRE(outcome(done) == outcome(expected));
+    return done.has_value();
+  }
+
+  Transform value() {
+    Transform X = random_.transform();
+    const std::size_t kind = random_.index(6);
+    if (kind == 0) X.covariance = StatedCovariance::unspecified();
+    if (kind == 1) X.covariance = StatedCovariance::exact();
+    return X;
+  }
+
+  void tell(const Frame& one) {
+    for (Owner whose = 0; whose <= kOwners; ++whose) {
+      if (whose != one.owner)
+        REQUIRE(of(whose).put_remote(one.id, one.parent, called(whose, one.owner)));
+    }
+  }
+
+  void add(const std::string& id, const std::string& parent, Owner owner) {
+    const Transform X = value();
+    REQUIRE(oracle_.add(id, parent, X));
+    REQUIRE(of(owner).add(id, parent, X));
+    frames_.push_back({id, parent, owner});
+    tell(frames_.back());
+  }
+
+  // Of a leaf, so that no frame waits for it.
+  void remove(const std::string& id) {
+    const Frame* found = frame(id);
+    const bool leaf = std::none_of(frames_.begin(), frames_.end(),
+                                   [&](const Frame& one) { return one.parent == id; });
+    if (!leaf || frames_.size() < 5) return;
+    REQUIRE(oracle_.remove(id));
+    REQUIRE(of(found->owner).remove(id));
+    for (Owner whose = 0; whose <= kOwners; ++whose) {
+      if (whose != found->owner) of(whose).drop_remote(id, called(whose, found->owner));
+    }
+    frames_.erase(frames_.begin() + (found - frames_.data()));
+  }
+
+  void move(const std::string& id, const std::string& parent) {
+    if (frame(id)->parent.empty() || !oracle_.move(id, parent)) return;
+    Frame& moved = *frame(id);
+    moved.parent = parent;
+    REQUIRE(of(moved.owner).move(id, parent));
+    tell(moved);
+  }
+
+  void set_timing(const std::string& id) {
+    EdgeTiming timing;
+    timing.count = 2 + random_.index(60);
+    timing.span = std::chrono::milliseconds(20 + random_.index(200));
+    timing.moving = random_.index(2) == 0;
+    if (random_.index(2) == 0) timing.process_noise = random_.covariance();
+    each_of(id, [&](Forest& forest) { return forest.set_timing(id, timing); });
+  }
+
+  void correlate(const std::string& id) {
+    Correlation correlation;
+    correlation.unknown = random_.index(3) == 0;
+    frame(id)->correlated = correlation.unknown;
+    each_of(id, [&](Forest& forest) { return forest.correlate(id, correlation); });
+  }
+
+  bool has_correlation(const std::string& a, const std::string& b) {
+    const auto edges = oracle_.edges(a, b);
+    return edges && std::any_of(edges->begin(), edges->end(),
+                                [&](const FrameInfo& edge) { return frame(edge.id)->correlated; });
+  }
+
+  void update(const std::string& id) {
+    if (frame(id)->parent.empty()) return;
+    const std::size_t kind = random_.index(10);
+    const Transform X = value();
+    if (kind < 2) {
+      each_of(id, [&](Forest& forest) { return forest.update(id, X); });
+      return;
+    }
+    if (kind < 8) now_ += static_cast<std::int64_t>(random_.index(4));
+    const std::int64_t late = kind < 8 ? 0 : static_cast<std::int64_t>(random_.index(40));
+    if (random_.index(4) > 0) {
+      each_of(id, [&](Forest& forest) { return forest.update(id, X, at_ms(now_ - late)); });
+      return;
+    }
+    const JointState state{&joint_, {random_.uniform(-3, 3), 1e-4}, 0};
+    const Transform moved = joint_transform(joint_, state.at.position, state.at.variance);
+    each_of(id, [&](Forest& forest) {
+      return forest.update_correlated({{*forest.find(id), moved, nullptr, state}},
+                                      at_ms(now_ - late));
+    });
+  }
+
+  template <class Value>
+  static std::string differs(const Result<Value>& found, const Result<Value>& expected,
+                             bool correlated) {
+    if (found && !expected) return "an answer where there is " + outcome(expected);
+    if (!found) {
+      return expected && !correlated ? "not read: " + outcome(found) : "";
+    }
+    return transform_diff(*found, *expected, 1e-12);
+  }
+
+  Random& random_;
+  Forest oracle_;
+  Forest reader_;
+  std::vector<std::unique_ptr<SharedForest>> owners_;
+  RemoteEdges others_;
+  std::vector<Frame> frames_;
+  Joint joint_ = [] {
+    Joint joint;
+    joint.S = Twist::Zero();
+    joint.S[5] = 1;
+    return joint;
+  }();
+  std::int64_t now_ = 1000;
+  int made_ = 0;
+  int answered_ = 0;
+  int dynamic_ = 0;
+  int only_owners_ = 0;
+};
+
+}  // namespace
+
+TEST_CASE("lookups in the memory of others are those of one forest") {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Random random(seed);
+    INFO("seed " << random.seed());
+    World world(random);
+    for (int i = 0; i < 600; ++i) {
+      world.step();
+      for (int k = 0; k < 3; ++k) REQUIRE(world.look() == "");
+    }
+    CHECK(world.answered() > 200);
+    CHECK(world.dynamic() > 40);
+  }
+}
+
+TEST_CASE("an edge that its owner has moved is not read until that is known here") {
+  SharedForest arm;
+  REQUIRE(arm.forest.add("base", "", along_x(0)));
+  REQUIRE(arm.forest.add("side", "base", along_x(100)));
+  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
+  Forest here;
+  RemoteEdges others;
+  others.attach(1, arm.seen(), nullptr);
+  REQUIRE(here.put_remote("base", "", 1));
+  REQUIRE(here.put_remote("side", "base", 1));
+  REQUIRE(here.put_remote("tip", "base", 1));
+  const auto look = [&] { return here.lookup("base", "tip", others); };
+  CHECK(outcome(look()) == "not_owner");
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  CHECK(x_of(look()) == 1);
+  REQUIRE(arm.forest.update("tip", along_x(2)));
+  CHECK(x_of(look()) == 2);
+
+  REQUIRE(arm.forest.move("tip", "side"));
+  CHECK(outcome(look()) == "not_owner");
+  CHECK(here.bind("base", "tip", others) == 0);
+  REQUIRE(here.put_remote("tip", "side", 1));
+  CHECK(outcome(look()) == "not_owner");
+  REQUIRE(here.bind("base", "tip", others) == 2);
+  CHECK(x_of(look()) == 102);
+
+  // Another frame of the same name.
+  REQUIRE(arm.forest.remove("tip"));
+  REQUIRE(arm.forest.add("tip", "side", along_x(5)));
+  CHECK(outcome(look()) == "not_owner");
+  REQUIRE(here.bind("base", "tip", others) == 2);
+  CHECK(x_of(look()) == 105);
+
+  // Another owner of it.
+  here.drop_remote("tip", 1);
+  REQUIRE(here.put_remote("tip", "side", 2));
+  CHECK(outcome(look()) == "not_owner");
+  CHECK(here.bind("base", "tip", others) == 0);
+}
+
+TEST_CASE("what is detached is not read, and its memory is kept while somebody reads it") {
+  SharedForest arm;
+  REQUIRE(arm.forest.add("base", "", along_x(0)));
+  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
+  Forest here;
+  REQUIRE(here.put_remote("base", "", 1));
+  REQUIRE(here.put_remote("tip", "base", 1));
+  RemoteEdges others;
+  bool released = false;
+  const int some = 0;
+  others.attach(1, arm.seen(), {&some, [&](const void*) { released = true; }});
+  CHECK(others.any());
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  CHECK(x_of(here.lookup("base", "tip", others)) == 1);
+  {
+    const epoch::Guard guard;
+    others.detach(1);
+    CHECK_FALSE(released);
+  }
+  CHECK_FALSE(others.any());
+  CHECK(outcome(here.lookup("base", "tip", others)) == "not_owner");
+  others.detach(1);
+  CHECK(released);
+}
+
+TEST_CASE("a forest outgrows its memory, and what does not fit is not read by others") {
+  SharedForest arm(std::size_t{256} << 10U);
+  REQUIRE(arm.forest.add("base", "", along_x(0)));
+  Forest here;
+  RemoteEdges others;
+  others.attach(1, arm.seen(), nullptr);
+  REQUIRE(here.put_remote("base", "", 1));
+  int read_here = 0;
+  constexpr int kFrames = 2000;
+  for (int i = 1; i <= kFrames; ++i) {
+    const std::string id = "f" + std::to_string(i);
+    REQUIRE(arm.forest.add(id, "base", along_x(i)));
+    REQUIRE(here.put_remote(id, "base", 1));
+    CHECK(x_of(arm.forest.lookup("base", id)) == i);
+    if (here.bind("base", id, others) == 0) continue;
+    ++read_here;
+    CHECK(x_of(here.lookup("base", id, others)) == i);
+  }
+  CHECK(read_here > 100);
+  CHECK(read_here < kFrames);
+}
+
+TEST_CASE("memory that is not an owner's, or of another layout, is not opened") {
+  SharedForest arm;
+  CHECK(RemoteForest::open(arm.memory.read(), arm.memory.size()));
+  CHECK_FALSE(RemoteForest::open(arm.memory.read(), 64));
+  CHECK_FALSE(RemoteForest::open(arm.memory.read(), arm.memory.size() / 2));
+  arm.arena->roots().layout += 1;
+  const auto other = RemoteForest::open(arm.memory.read(), arm.memory.size());
+  REQUIRE_FALSE(other);
+  CHECK(other.error().message == "it has another layout: its owner is another build");
+  arm.arena->roots().layout -= 1;
+  arm.arena->roots().magic += 1;
+  CHECK_FALSE(RemoteForest::open(arm.memory.read(), arm.memory.size()));
+}
+
+TEST_CASE("damaged memory does no harm") {
+  Random random(7);
+  INFO("seed " << random.seed());
+  constexpr int kDepth = 12;
+  constexpr std::size_t kPage = 4096;
+  SharedForest arm(std::size_t{1} << 20U);
+  const auto id = [](int i) { return "f" + std::to_string(i); };
+  EdgeTiming noisy;
+  noisy.process_noise = random.covariance();
+  Joint joint;
+  joint.S = Twist::Zero();
+  joint.S[5] = 1;
+  REQUIRE(arm.forest.add(id(0), "", along_x(0)));
+  Forest here;
+  REQUIRE(here.put_remote(id(0), "", 1));
+  for (int i = 1; i <= kDepth; ++i) {
+    REQUIRE(arm.forest.add(id(i), id(i - 1), random.transform()));
+    REQUIRE(here.put_remote(id(i), id(i - 1), 1));
+    if (i % 3 == 0) REQUIRE(arm.forest.set_timing(id(i), noisy));
+    for (int n = 0; n < 40; ++n) {
+      if (i % 4 == 0) {
+        const JointState state{&joint, {0.1 * n, 1e-4}, 0};
+        const Transform X = joint_transform(joint, state.at.position, state.at.variance);
+        REQUIRE(arm.forest.update_correlated({{*arm.forest.find(id(i)), X, nullptr, state}},
+                                             at_ms(100 + 10 * n + i)));
+      } else {
+        REQUIRE(arm.forest.update(id(i), random.transform(), at_ms(100 + 10 * n + i)));
+      }
+    }
+  }
+  // Between pages that nobody may touch.
+  const std::size_t used = (arm.arena->used() + kPage - 1) / kPage * kPage;
+  auto* around = static_cast<char*>(
+      mmap(nullptr, used + 2 * kPage, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0));
+  char* copy = around + kPage;
+  REQUIRE(mprotect(copy, used, PROT_READ | PROT_WRITE) == 0);
+  const auto* intact = static_cast<const char*>(arm.memory.read());
+  auto* roots = reinterpret_cast<SharedRoots*>(copy);
+  std::uint64_t answers = 0;
+  std::uint64_t refused = 0;
+  const auto damage = [&] {
+    const std::size_t places = 1 + random.index(40);
+    for (std::size_t k = 0; k < places; ++k) {
+      const std::size_t word = random.index(used / 8) * 8;
+      std::uint64_t value = 0;
+      std::memcpy(&value, copy + word, 8);
+      const std::uint64_t base = roots->base;
+      switch (random.index(6)) {
+        case 0:
+          value = random.engine()();
+          break;
+        case 1:
+          value ^= std::uint64_t{1} << random.index(64);
+          break;
+        case 2:
+          value = base + random.index(used + kPage);
+          break;
+        case 3:
+          value = base + random.index(used / 64) * 64;
+          break;
+        case 4:
+          value = ~std::uint64_t{0};
+          break;
+        default:
+          value = 0;
+      }
+      std::memcpy(copy + word, &value, 8);
+    }
+  };
+  for (int round = 0; round < 3000; ++round) {
+    std::memcpy(copy, intact, used);
+    roots->size = used;
+    RemoteEdges others;
+    const bool early = round % 2 == 0;
+    const auto opened = RemoteForest::open(copy, used);
+    REQUIRE(opened);
+    others.attach(1, *opened, nullptr);
+    if (early) damage();
+    (void)here.bind(id(0), id(kDepth), others);
+    if (!early) damage();
+    Query query;
+    query.at = at_ms(100 + static_cast<std::int64_t>(random.index(450)));
+    query.extrapolate = std::chrono::milliseconds(20);
+    const auto newest = here.lookup(id(0), id(kDepth), others);
+    const auto then = here.lookup(id(0), id(kDepth), query, others);
+    for (const Transform* X :
+         {newest ? &*newest : nullptr, then ? static_cast<const Transform*>(&*then) : nullptr}) {
+      if (X == nullptr) {
+        ++refused;
+        continue;
+      }
+      ++answers;
+      CHECK(check_finite(*X));
+    }
+  }
+  CHECK(answers > 100);
+  CHECK(refused > 100);
+  munmap(around, used + 2 * kPage);
+}
+
+}  // namespace tfdude
