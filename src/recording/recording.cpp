@@ -167,10 +167,10 @@ class Recording::Impl {
     PathAppends appends(a, b);
     appends.begin(*state_);
     std::size_t done = 0;
-    // Answers what can be answered now, of what was asked until now.
-    const auto answer = [&](bool ends) {
+    // Answers what can be answered now, of what was asked before an instant. At the end: all.
+    const auto answer = [&](Time before_this, bool ends = false) {
       std::optional<std::pair<Handle, Handle>> handles;  // once it is known that all have values
-      for (; done < order.size() && (ends || instants[order[done]] <= now_); ++done) {
+      for (; done < order.size() && (ends || instants[order[done]] < before_this); ++done) {
         query.at = instants[order[done]];
         if (handles && query.order == Order::kSecond) {
           const auto X_AB = state_->forest().lookup(handles->first, handles->second, query);
@@ -193,23 +193,24 @@ class Recording::Impl {
         all.add(order[done], X_AB);
       }
     };
-    answer(false);
+    answer(now_ + std::chrono::nanoseconds(1));
     for (std::size_t since = 0; done < order.size(); ++since) {
       auto message = cursor_.next();
       if (!message) {
-        answer(true);
+        answer({}, true);
         break;
       }
       const bool appended = appends.only_appends(*state_, *message);
       now_ = std::max(now_, message->log);
       if (!appended || since >= kAtOnce) {
-        answer(false);
+        // Who asks at the time of the message has it.
+        answer(message->log);
         since = 0;
       }
       state_->apply(*message);
       if (appended) continue;
       appends.begin(*state_);
-      answer(false);
+      answer(message->log);
     }
     return std::move(all).take();
   }
