@@ -1,5 +1,7 @@
 #include "client.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <map>
 
 #include <pybind11/stl.h>
@@ -10,6 +12,7 @@
 #include "bind.hpp"
 #include "session.hpp"
 #include "structure.hpp"
+#include "waiting.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -137,6 +140,24 @@ void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
         return from_stamp(value_of(session.call([](Client& c) { return c.now(); })));
       },
       "The time of this client's clock [ns].");
+  cls.def(
+      "wait_until",
+      [](const Session& session, py::handle time, py::handle timeout) {
+        const Time until = to_time(time);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        const auto end = std::chrono::steady_clock::now() + std::min(wait, Milliseconds(1 << 30));
+        while (true) {
+          const auto left = std::chrono::ceil<Milliseconds>(end - std::chrono::steady_clock::now());
+          const auto slice = std::max(std::min(left, kLook), Milliseconds(0));
+          const auto reached = session.call([&](Client& c) { return c.wait_until(until, slice); });
+          if (reached) return;
+          check_interrupted();
+          if (left <= Milliseconds(0)) check(reached);
+        }
+      },
+      py::arg("time"), py::arg("timeout"),
+      "Waits until this client's clock has reached a time. Raises TimeoutException after timeout\n"
+      "[s].");
 }
 
 }  // namespace
@@ -181,8 +202,10 @@ void bind_client(py::module_& module) {
   bind_writes(cls);
   bind_parts(cls);
   bind_structure(cls);
-  bind_lookups(cls);
-  bind_batches(module, cls);
+  bind_lookups(module, cls);
+  bind_many(module, cls);
+  bind_clouds(module, cls, module.attr("Transform"));
+  bind_explanations(module, cls);
   bind_values_of_many(module, cls);
   bind_watches(module, cls);
   bind_events(module, cls);

@@ -49,9 +49,13 @@ struct OpenArguments {
 [[nodiscard]] Options to_options(const OpenArguments& arguments);
 
 /// Lookups, by this library's names and tf2's.
-void bind_lookups(ClientClass& cls);
-/// lookup_many().
-void bind_batches(py::module_& module, ClientClass& cls);
+void bind_lookups(py::module_& module, ClientClass& cls);
+/// Many frames or instants in one call.
+void bind_many(py::module_& module, ClientClass& cls);
+/// Clouds of points, also for a Transform.
+void bind_clouds(py::module_& module, ClientClass& cls, py::handle transform);
+/// why().
+void bind_explanations(py::module_& module, ClientClass& cls);
 /// Values of many edges or joints, and streams.
 void bind_values_of_many(py::module_& module, ClientClass& cls);
 void bind_watches(py::module_& module, ClientClass& cls);

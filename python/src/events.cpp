@@ -141,6 +141,7 @@ void bind_events(py::module_& module, ClientClass& cls) {
       .def(py::init<>())
       .def("fileno", &Mailbox::fd)
       .def("take", &Mailbox::take)
+      .def("wake", &Mailbox::wake)
       .def("end", &Mailbox::end)
       .def_property_readonly("ended", &Mailbox::ended);
   py::class_<Listening>(module, "Subscription",

@@ -22,6 +22,56 @@ StampedTransform lookup(const Session& session, const std::string& a, const std:
   return value_of(session.call([&](Client& c) { return c.lookup(a, b, query); }));
 }
 
+/// Waits until a lookup can be answered, as calls that are more than one do first.
+void await_lookup(const Session& session, const std::string& a, const std::string& b,
+                  const Query& query, Milliseconds wait) {
+  if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(session, a, b, query, wait));
+}
+
+/// Whether a lookup would succeed, or why not.
+struct Possible {
+  std::optional<Error> why_not;
+};
+
+Possible can_lookup(const Session& session, const std::string& a, const std::string& b,
+                    const Query& query, Milliseconds wait) {
+  if (wait > Milliseconds(0)) {
+    const auto found = wait_for_lookup(session, a, b, query, wait);
+    return found ? Possible{} : Possible{found.error()};
+  }
+  const auto can = session.call([&](Client& c) { return c.can_lookup(a, b, query); });
+  return can ? Possible{} : Possible{can.error()};
+}
+
+void bind_possible(py::module_& module, ClientClass& cls) {
+  py::class_<Possible>(module, "Possible",
+                       "Whether a lookup would succeed: true or false, with the reason.")
+      .def("__bool__", [](const Possible& self) { return !self.why_not; })
+      .def_property_readonly(
+          "error",
+          [](const Possible& self) -> py::object {
+            if (!self.why_not) return py::none();
+            return exception_of(*self.why_not);
+          },
+          "The exception that lookup() would raise; None if it would not.")
+      .def("__repr__", [](const Possible& self) {
+        return self.why_not ? "Possible(False: " + self.why_not->message + ")"
+                            : std::string("Possible(True)");
+      });
+  cls.def(
+      "can_lookup",
+      [](const Session& session, const std::string& a, const std::string& b, py::handle at,
+         py::handle timeout, py::handle extrapolate) {
+        return can_lookup(session, a, b, to_query(at, extrapolate, py::none(), 2),
+                          to_milliseconds(timeout, "timeout"));
+      },
+      py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
+      py::arg("timeout") = 0.0, py::arg("extrapolate") = 0.0,
+      "Whether lookup() would succeed, waiting for it up to timeout [s]: a Possible, which is "
+      "true\n"
+      "or false and says why.");
+}
+
 void bind_own(ClientClass& cls) {
   cls.def(
       "lookup",
@@ -43,52 +93,65 @@ void bind_own(ClientClass& cls) {
   cls.def(
       "lookup_full",
       [](const Session& session, const std::string& a, py::handle at_a, const std::string& b,
-         py::handle at_b, const std::string& fixed) {
+         py::handle at_b, const std::string& fixed, py::handle timeout) {
         Query query_a;
         Query query_b;
         query_a.at = to_stamp(at_a);
         query_b.at = to_stamp(at_b);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        await_lookup(session, fixed, a, query_a, wait);
+        await_lookup(session, fixed, b, query_b, wait);
         return value_of(
             session.call([&](Client& c) { return c.lookup(a, query_a, b, query_b, fixed); }));
       },
-      py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"),
+      py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"), py::kw_only(),
+      py::arg("timeout") = 0.0,
       "Frame b at one instant, seen from frame a at another, through a frame that is assumed\n"
-      "fixed in between.");
+      "fixed in between. timeout [s]: how long to wait for the data of each.");
   cls.def(
       "transform",
       [](const Session& session, const std::string& a, const std::string& b, py::handle what,
-         py::handle at, py::handle covariance, bool direction, int order) -> py::object {
+         py::handle at, py::handle covariance, bool direction, int order,
+         py::handle timeout) -> py::object {
         Query query;
         query.at = to_stamp(at);
         query.order = to_order(order);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
         if (py::isinstance<Transform>(what)) {
           if (!covariance.is_none() || direction) {
             throw py::type_error("a Transform has its own covariance, and no direction");
           }
           const auto& X_BC = what.cast<const Transform&>();
+          await_lookup(session, a, b, query, wait);
           return py::cast(
               value_of(session.call([&](Client& c) { return c.transform(a, b, X_BC, query); })));
         }
         Points points = to_points(what, covariance, direction);
-        return transformed(py::cast(lookup(session, a, b, query, Milliseconds(0))),
-                           std::move(points), query.order);
+        return transformed(py::cast(lookup(session, a, b, query, wait)), std::move(points),
+                           query.order);
       },
       py::arg("a"), py::arg("b"), py::arg("what"), py::arg("at") = py::none(), py::kw_only(),
       py::arg("covariance") = py::none(), py::arg("direction") = false, py::arg("order") = 2,
+      py::arg("timeout") = 0.0,
       "Points (3,) or (N, 3) of frame b, in frame a: as lookup(a, b).transform(what, ...). Of a\n"
-      "Transform X_BC with an error of its own: X_AC. Raises as lookup().");
+      "Transform X_BC with an error of its own: X_AC. timeout [s]: how long to wait for the data.\n"
+      "Raises as lookup(). transform_cloud() is for many points.");
   cls.def(
       "velocity",
       [](const Session& session, const std::string& a, const std::string& b, py::handle at,
-         py::handle over) {
+         py::handle over, py::handle timeout) {
         VelocityQuery query;
         query.at = to_stamp(at);
         query.over = to_duration(over, "over");
+        Query middle;
+        middle.at = query.at;
+        await_lookup(session, a, b, middle, to_milliseconds(timeout, "timeout"));
         return value_of(session.call([&](Client& c) { return c.velocity(a, b, query); }));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(), py::arg("over") = 0.1,
+      py::arg("timeout") = 0.0,
       "The mean velocity of frame b in frame a over an interval of `over` seconds around `at`, or\n"
-      "up to the newest data.");
+      "up to the newest data. timeout [s]: how long to wait for the data of `at`.");
 }
 
 void bind_as_tf2(ClientClass& cls) {
@@ -109,11 +172,7 @@ void bind_as_tf2(ClientClass& cls) {
          py::handle time, py::handle timeout) {
         const Query query = tf2_query(time);
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
-        if (wait > Milliseconds(0)) {
-          return wait_for_lookup(session, target, source, query, wait).has_value();
-        }
-        return session.call(
-            [&](Client& c) { return c.can_lookup(target, source, query).has_value(); });
+        return !can_lookup(session, target, source, query, wait).why_not;
       },
       py::arg("target_frame"), py::arg("source_frame"), py::arg("time") = py::none(),
       py::arg("timeout") = 0.0,
@@ -132,7 +191,8 @@ void bind_as_tf2(ClientClass& cls) {
 
 }  // namespace
 
-void bind_lookups(ClientClass& cls) {
+void bind_lookups(py::module_& module, ClientClass& cls) {
+  bind_possible(module, cls);
   bind_own(cls);
   bind_as_tf2(cls);
 }

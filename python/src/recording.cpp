@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 
 #include "bind.hpp"
+#include "many.hpp"
 #include "session.hpp"
 #include "structure.hpp"
 
@@ -65,6 +66,22 @@ void bind_questions(RecordingClass& cls) {
       py::arg("a"), py::arg("b"), py::arg("at"), py::kw_only(), py::arg("timeout") = 10.0,
       "X_AB at a stamp, as Client.lookup() answered that was asked at that instant and waited:\n"
       "goes there, and on until all edges have their data. timeout: of the recording's time [s].");
+  cls.def(
+      "trajectory",
+      [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle instants,
+         py::handle timeout, int order) {
+        std::vector<Time> times = to_instants(instants);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        Query query;
+        query.order = to_order(order);
+        auto found = shared.call(
+            [&](Recording& recording) { return recording.trajectory(a, b, times, query, wait); });
+        return trajectory_object(std::move(found), std::move(times));
+      },
+      py::arg("a"), py::arg("b"), py::arg("instants"), py::kw_only(), py::arg("timeout") = 10.0,
+      py::arg("order") = 2,
+      "X_AB at many instants, in any order: a Trajectory, with arrays (N, 7) and (N, 6, 6). Each\n"
+      "as lookup_at() answers it, but the file is read once.");
   cls.def(
       "lookup_full",
       [](SharedRecording& shared, const std::string& a, py::handle at_a, const std::string& b,

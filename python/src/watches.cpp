@@ -59,6 +59,35 @@ void bind_common(py::class_<Watching<Watch>>& cls) {
   cls.def("_listen", &listen<Watch>, py::arg("mailbox"));
 }
 
+/// In slices, as wait_for_more().
+StampedTransform wait_next(Path& self, py::handle timeout) {
+  const Milliseconds wait = to_milliseconds(timeout, "timeout");
+  const bool forever = wait == Milliseconds::max();
+  const Steady::time_point end = forever ? Steady::time_point::max() : Steady::now() + wait;
+  while (true) {
+    const auto left = std::chrono::ceil<Milliseconds>(end - Steady::now());
+    const Milliseconds slice = std::max(std::min(left, kLook), Milliseconds(0));
+    auto next = without_gil([&] { return self.watch.wait_next(slice); });
+    if (next) return *std::move(next);
+    check_interrupted();
+    if (!forever && left <= slice) raise(next.error());
+  }
+}
+
+std::unique_ptr<Listening> on_value(const Path& self, py::function callback) {
+  check_usable();
+  const SharedFunction function = share(std::move(callback));
+  return without_gil([&] {
+    return std::make_unique<Listening>(
+        self.watch.on_value([function](const Result<StampedTransform>& X) {
+          call_python(*function, [&]() -> py::object {
+            if (X) return py::cast(*X);
+            return exception_of(X.error());
+          });
+        }));
+  });
+}
+
 WatchOptions options_of(double rate, bool composed, py::handle span) {
   WatchOptions options;
   options.rate = rate;
@@ -91,19 +120,30 @@ void bind_path(py::module_& module, ClientClass& client) {
       py::arg("at") = py::none(), py::kw_only(), py::arg("extrapolate") = 0.0,
       py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
       "As Client.lookup(), from the received values.");
+  cls.def("wait_next", &wait_next, py::arg("timeout") = 1.0,
+          "Waits for a value that this object has not returned yet: the first time for the newest\n"
+          "one. Values between two calls are not kept. Raises TimeoutException after timeout [s].");
+  cls.def(
+      "on_value", &on_value, py::arg("callback"),
+      "Calls a function with the newest transform, and then when there is another one, from a\n"
+      "thread of the library, one call at a time; or with an exception, when there is none any\n"
+      "more. Returns a Subscription, which must be kept.");
   bind_common(cls);
   client.def(
       "watch",
       [](const Session& session, const std::string& a, const std::string& b, double rate,
-         bool composed, py::handle span) {
+         bool composed, py::handle span, py::handle timeout) {
         const WatchOptions options = options_of(rate, composed, span);
+        const Milliseconds wait = to_milliseconds(timeout, "timeout");
+        if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(session, a, b, {}, wait));
         return made(session, session.call([&](Client& c) { return c.watch(a, b, options); }));
       },
       py::arg("a"), py::arg("b"), py::kw_only(), py::arg("rate") = 0.0, py::arg("composed") = false,
-      py::arg("span") = py::none(),
+      py::arg("span") = py::none(), py::arg("timeout") = 0.0,
       "Asks the owners of the path to push its changes.\n\n"
       "rate [Hz]: the most at which an owner sends; 0: every sample. composed: one transform for\n"
-      "each partition instead of all its edges. span [s]: how much history is kept here.");
+      "each partition instead of all its edges. span [s]: how much history is kept here. timeout\n"
+      "[s]: how long to wait for missing frames and data.");
 }
 
 void bind_edges(py::module_& module, ClientClass& client) {

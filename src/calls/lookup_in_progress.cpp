@@ -17,7 +17,8 @@ std::size_t slowest(const std::vector<SegmentValues>& answers) {
   return found;
 }
 
-// Names an owner with another clock than this participant; empty: there is none.
+}  // namespace
+
 std::string other_clock(const Directory& directory, ClockKind own, const std::vector<Part>& parts) {
   for (const Part& part : parts) {
     const auto theirs = part.owner == kHeldHere ? std::nullopt : directory.info(part.owner).clock;
@@ -27,8 +28,6 @@ std::string other_clock(const Directory& directory, ClockKind own, const std::ve
   }
   return {};
 }
-
-}  // namespace
 
 Result<std::vector<SegmentValues>> values_of(std::vector<Reply> replies) {
   std::vector<SegmentValues> answers;

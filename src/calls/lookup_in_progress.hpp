@@ -45,6 +45,10 @@ struct WantedLookup {
 /// The values in the owners' replies, in order, or the first error.
 [[nodiscard]] Result<std::vector<SegmentValues>> values_of(std::vector<Reply> replies);
 
+/// Names an owner of these parts with another clock than this participant; empty: there is none.
+[[nodiscard]] std::string other_clock(const Directory& directory, ClockKind own,
+                                      const std::vector<Part>& parts);
+
 /// A lookup that needs other owners: the requests, and the evaluation of their replies.
 class LookupInProgress {
  public:

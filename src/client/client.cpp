@@ -10,6 +10,12 @@
 namespace tfdude {
 namespace {
 
+Result<StampedTransform> look_up(Lookups& lookups, std::string_view a, std::string_view b,
+                                 const Query& query, Milliseconds wait) {
+  if (wait > Milliseconds(0)) return lookups.wait(a, b, query, wait);
+  return lookups.lookup(a, b, query);
+}
+
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
                                  const std::vector<double>& positions,
                                  const std::vector<double>& variances, std::optional<Time> stamp) {
@@ -200,10 +206,38 @@ Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, 
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
-                                        const Query& at_b, std::string_view fixed) {
+                                        const Query& at_b, std::string_view fixed,
+                                        Milliseconds wait) {
+  if (wait > Milliseconds(0)) {
+    const Deadline deadline(wait);
+    auto X_FA = participant_->lookups().wait(fixed, a, at_a, wait);
+    if (!X_FA) return X_FA;
+    auto X_FB = participant_->lookups().wait(fixed, b, at_b, deadline.left());
+    if (!X_FB) return X_FB;
+  }
   return participant_->two_instants().lookup(std::string(a), at_a, std::string(b), at_b,
                                              std::string(fixed),
                                              participant_->discovery().call_deadline());
+}
+
+std::vector<Result<StampedTransform>> Client::lookup_many(const std::vector<FramePair>& pairs,
+                                                          const Query& query, Milliseconds wait) {
+  return participant_->many_lookups().lookup(pairs, query, wait);
+}
+
+std::vector<Result<StampedTransform>> Client::lookup_many(const std::string& a,
+                                                          const std::vector<std::string>& frames,
+                                                          const Query& query, Milliseconds wait) {
+  std::vector<FramePair> pairs;
+  pairs.reserve(frames.size());
+  for (const std::string& frame : frames) pairs.push_back({a, frame});
+  return lookup_many(pairs, query, wait);
+}
+
+Result<Trajectory> Client::trajectory(std::string_view a, std::string_view b,
+                                      const std::vector<Time>& instants, const Query& query,
+                                      Milliseconds wait) {
+  return participant_->many_lookups().trajectory(a, b, instants, query, wait);
 }
 
 PendingLookup Client::lookup_async(const std::string& a, const std::string& b, const Query& query,
@@ -218,22 +252,23 @@ std::future<Result<StampedTransform>> Client::lookup_async(const std::string& a,
 }
 
 Result<TransformedPoints> Client::transform(std::string_view a, std::string_view b,
-                                            const std::vector<Point>& points_B,
-                                            const Query& query) {
+                                            const std::vector<Point>& points_B, const Query& query,
+                                            Milliseconds wait) {
   for (std::size_t i = 0; i < points_B.size(); ++i) {
     if (auto ok = check_point(points_B[i]); !ok) {
       return fail_at("point " + std::to_string(i) + " of frame " + quote(b), ok.error());
     }
   }
-  return lookup(a, b, query).map([&](const StampedTransform& X_AB) {
-    return TransformedPoints{tfdude::transform(X_AB, points_B, query.order), X_AB};
-  });
+  const auto X_AB = look_up(participant_->lookups(), a, b, query, wait);
+  if (!X_AB) return tl::unexpected(X_AB.error());
+  return TransformedPoints{tfdude::transform(*X_AB, points_B, query.order), *X_AB};
 }
 
 Result<StampedTransform> Client::transform(std::string_view a, std::string_view b,
-                                           const Transform& X_BC, const Query& query) {
+                                           const Transform& X_BC, const Query& query,
+                                           Milliseconds wait) {
   if (auto finite = check_finite(X_BC); !finite) return tl::unexpected(finite.error());
-  return lookup(a, b, query).map([&](StampedTransform X_AC) {
+  return look_up(participant_->lookups(), a, b, query, wait).map([&](StampedTransform X_AC) {
     const auto belief = [](const Transform& X) {
       return Belief{X.pose, X.covariance.of_specified(), {}, {}, !X.covariance.complete()};
     };
@@ -242,12 +277,33 @@ Result<StampedTransform> Client::transform(std::string_view a, std::string_view 
   });
 }
 
-Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Query& query) {
-  return participant_->lookups().lookup(a, b, query).map([](const StampedTransform&) {});
+Result<TransformedCloud<double>> Client::transform_cloud(
+    std::string_view a, std::string_view b, const Eigen::Ref<const Eigen::Matrix3Xd>& points_B,
+    const CloudQuery& query, Milliseconds wait) {
+  return participant_->many_lookups().transform_cloud<double>(a, b, points_B, query, wait);
+}
+
+Result<TransformedCloud<float>> Client::transform_cloud(
+    std::string_view a, std::string_view b, const Eigen::Ref<const Eigen::Matrix3Xf>& points_B,
+    const CloudQuery& query, Milliseconds wait) {
+  return participant_->many_lookups().transform_cloud<float>(a, b, points_B, query, wait);
+}
+
+Result<void> Client::can_lookup(std::string_view a, std::string_view b, const Query& query,
+                                Milliseconds wait) {
+  return look_up(participant_->lookups(), a, b, query, wait).map([](const StampedTransform&) {});
+}
+
+Explanation Client::why(const std::string& a, const std::string& b, const WhyQuery& query) {
+  return participant_->explanations().why(a, b, query);
 }
 
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
-                                const WatchOptions& options) {
+                                const WatchOptions& options, Milliseconds wait) {
+  if (wait > Milliseconds(0)) {
+    const auto there = participant_->lookups().wait(a, b, {}, wait);
+    if (!there) return tl::unexpected(there.error());
+  }
   return participant_->watches().watch(a, b, options).map([](auto path) {
     return PathWatch(path);
   });
@@ -261,13 +317,23 @@ Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
 }
 
 Result<Velocity> Client::velocity(const std::string& a, const std::string& b,
-                                  const VelocityQuery& query) {
+                                  const VelocityQuery& query, Milliseconds wait) {
+  if (wait > Milliseconds(0)) {
+    Query then;
+    then.at = query.at;
+    const auto there = participant_->lookups().wait(a, b, then, wait);
+    if (!there) return tl::unexpected(there.error());
+  }
   return participant_->velocities().velocity(a, b, query,
                                              participant_->discovery().call_deadline());
 }
 
 Result<Time> Client::now() {
   return participant_->clock().await(participant_->discovery().call_deadline());
+}
+
+Result<void> Client::wait_until(Time time, Milliseconds wait) {
+  return participant_->clock().wait_until(time, Deadline(wait));
 }
 
 Result<void> Client::set_time(Time now) { return participant_->set_time(now, true); }

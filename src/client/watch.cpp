@@ -1,5 +1,6 @@
 #include "tfdude/client/watch.hpp"
 
+#include "runtime/deadline.hpp"
 #include "runtime/watched_path.hpp"
 
 namespace tfdude {
@@ -21,6 +22,27 @@ std::uint64_t PathWatch::messages() const { return path_->messages(); }
 bool PathWatch::wait_for_more(std::uint64_t messages,
                               std::chrono::steady_clock::time_point deadline) const {
   return path_->wait_for_more(messages, deadline);
+}
+
+Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
+  const Deadline deadline(wait);
+  auto newest = latest();
+  const std::uint64_t messages = this->messages();
+  if (returned_ || !newest) {
+    if (!path_->wait_for_more(returned_.value_or(messages), deadline.at())) {
+      if (!newest) return newest;
+      return fail(Errc::kTimeout,
+                  "nothing new of the " + path_->described() + " within " + deadline.text());
+    }
+    newest = latest();
+  }
+  if (newest) returned_ = this->messages();
+  return newest;
+}
+
+Subscription PathWatch::on_value(
+    std::function<void(const Result<StampedTransform>&)> callback) const {
+  return Subscription(path_->on_value(std::move(callback)));
 }
 
 Subscription PathWatch::on_news(std::function<void()> listener) const {

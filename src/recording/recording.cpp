@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
+#include "recording/path_appends.hpp"
 #include "recording/state.hpp"
 #include "tree/over_fixed.hpp"
+#include "types/trajectory_builder.hpp"
 
 namespace tfdude {
 namespace {
@@ -149,6 +152,69 @@ class Recording::Impl {
     }
   }
 
+  // Each instant is looked up in the state that lookup_at() would find its answer in, or in one that
+  // differs only by messages that append samples.
+  Trajectory trajectory(std::string_view a, std::string_view b, const std::vector<Time>& instants,
+                        Query query, Milliseconds wait) {
+    constexpr std::size_t kAtOnce = 256;
+    std::vector<std::size_t> order(instants.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t x, std::size_t y) { return instants[x] < instants[y]; });
+    TrajectoryBuilder all(instants.size());
+    if (instants.empty()) return std::move(all).take();
+    seek(instants[order.front()]);
+    PathAppends appends(a, b);
+    appends.begin(*state_);
+    std::size_t done = 0;
+    // Answers what can be answered now, of what was asked before an instant. At the end: all.
+    const auto answer = [&](Time before_this, bool ends = false) {
+      std::optional<std::pair<Handle, Handle>> handles;  // once it is known that all have values
+      for (; done < order.size() && (ends || instants[order[done]] < before_this); ++done) {
+        query.at = instants[order[done]];
+        if (handles && query.order == Order::kSecond) {
+          const auto X_AB = state_->forest().lookup(handles->first, handles->second, query);
+          if (X_AB) {
+            all.add(order[done], X_AB);
+            continue;
+          }
+        }
+        const State* before = state_.get();
+        const auto X_AB = lookup(a, b, query);
+        if (state_.get() != before) appends.begin(*state_);
+        const auto from = state_->forest().find(a);
+        const auto to = state_->forest().find(b);
+        if (X_AB && from && to) handles = {*from, *to};
+        const bool late = now_ - *query.at > wait;
+        if (!X_AB && may_come(X_AB.error().code) && X_AB.error().code != Errc::kUnreachable &&
+            !late && !ends) {
+          return;
+        }
+        all.add(order[done], X_AB);
+      }
+    };
+    answer(now_ + std::chrono::nanoseconds(1));
+    for (std::size_t since = 0; done < order.size(); ++since) {
+      auto message = cursor_.next();
+      if (!message) {
+        answer({}, true);
+        break;
+      }
+      const bool appended = appends.only_appends(*state_, *message);
+      now_ = std::max(now_, message->log);
+      if (!appended || since >= kAtOnce) {
+        // Who asks at the time of the message has it.
+        answer(message->log);
+        since = 0;
+      }
+      state_->apply(*message);
+      if (appended) continue;
+      appends.begin(*state_);
+      answer(message->log);
+    }
+    return std::move(all).take();
+  }
+
   [[nodiscard]] std::vector<RecordedNews> next() {
     while (const auto message = step_message()) {
       std::vector<RecordedNews> all;
@@ -282,6 +348,12 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std
   auto to_b = edges_to(b, *X_FB);
   if (!to_b) return tl::unexpected(std::move(to_b.error()));
   return over_fixed(*X_FA, *X_FB, *std::move(to_a), *std::move(to_b), query.order);
+}
+
+Trajectory Recording::trajectory(std::string_view a, std::string_view b,
+                                 const std::vector<Time>& instants, const Query& query,
+                                 Milliseconds wait) {
+  return impl_->trajectory(a, b, instants, query, wait);
 }
 
 Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {

@@ -77,6 +77,10 @@ void Callbacks::Line::go() {
   if (look) state_->look->ask_by(Clock::now() + kPatience);
 }
 
+std::shared_ptr<Callbacks::Line> Callbacks::Line::another() const {
+  return std::make_shared<Line>(state_, Milliseconds(0));
+}
+
 void Callbacks::Line::close() {
   std::deque<Call> dropped;  // destroyed without the lock
   Lock lock(state_->mutex);

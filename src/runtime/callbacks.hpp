@@ -63,6 +63,9 @@ class Callbacks::Line : public std::enable_shared_from_this<Line> {
   void prepare(Call call);
   void go();
 
+  /// Another line of the same Callbacks, which may have ended.
+  [[nodiscard]] std::shared_ptr<Line> another() const;
+
   /// Drops the calls that have not started. After it has returned none is running and none will
   /// run, except one that calls this.
   void close();

@@ -17,6 +17,12 @@ class Deadline : public TimeLimit {
     return other.at() < at() ? other : *this;
   }
 
+  /// What is left of it.
+  [[nodiscard]] Milliseconds left(Clock::time_point now = Clock::now()) const {
+    if (at() == Clock::time_point::max()) return Milliseconds::max();
+    return std::chrono::ceil<Milliseconds>(at() - now);
+  }
+
   [[nodiscard]] bool over(Clock::time_point now = Clock::now()) const {
     return TimeLimit::over(now);
   }

@@ -36,6 +36,8 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       lookups_(context_, watches_, &memory_),
       velocities_(context_, lookups_),
       two_instants_(context_, lookups_),
+      many_lookups_(context_, lookups_, two_instants_),
+      explanations_(context_, lookups_, queries_, joints_),
       descriptions_(requests_, options.description),
       streams_(context_) {
   const Lock lock(structure_.mutex);

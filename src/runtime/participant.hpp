@@ -13,8 +13,10 @@
 
 #include "runtime/context.hpp"
 #include "runtime/descriptions.hpp"
+#include "runtime/explanations.hpp"
 #include "runtime/joint_calls.hpp"
 #include "runtime/lookups.hpp"
+#include "runtime/many_lookups.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/memory_reads.hpp"
 #include "runtime/observations.hpp"
@@ -63,6 +65,8 @@ class Participant final : public TransportHandler,
   [[nodiscard]] Lookups& lookups() { return lookups_; }
   [[nodiscard]] Velocities& velocities() { return velocities_; }
   [[nodiscard]] TwoInstants& two_instants() { return two_instants_; }
+  [[nodiscard]] ManyLookups& many_lookups() { return many_lookups_; }
+  [[nodiscard]] Explanations& explanations() { return explanations_; }
   [[nodiscard]] Descriptions& descriptions() { return descriptions_; }
   /// @return kInvalidInput in a client that follows only some frames
   [[nodiscard]] Result<Streams*> streams();
@@ -154,6 +158,8 @@ class Participant final : public TransportHandler,
   Lookups lookups_;
   Velocities velocities_;
   TwoInstants two_instants_;
+  ManyLookups many_lookups_;
+  Explanations explanations_;
   Descriptions descriptions_;
   std::atomic<std::uint64_t> jumps_{0};  // of the clock
   Streams streams_;

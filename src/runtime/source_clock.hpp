@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -39,6 +40,31 @@ class SourceClock {
     return fail(Errc::kNotYet, "the clock is external, and nobody has published the time");
   }
 
+  /// Waits until a time. The system's clock may be set meanwhile, so it is looked at repeatedly.
+  /// @return kTimeout at the deadline; the message says what time it is
+  [[nodiscard]] Result<void> wait_until(Time time, const Deadline& deadline) {
+    constexpr Milliseconds kLook{50};
+    ++waiting_;
+    {
+      Lock lock(mutex_);
+      for (auto now = this->now(); !now || *now < time; now = this->now()) {
+        const auto steady = Deadline::Clock::now();
+        if (deadline.over(steady)) break;
+        auto until = std::min(deadline.at(), steady + kLook);
+        if (now && kind_ == ClockKind::kSystem) {
+          const std::chrono::nanoseconds look = kLook;
+          until = std::min(until, steady + std::min(time - *now, look));
+        }
+        (void)first_.wait_until(lock, until);
+      }
+    }
+    --waiting_;
+    const auto now = this->now();
+    if (now && *now >= time) return {};
+    return fail(Errc::kTimeout, "it is not " + readable(time) + " within " + deadline.text() +
+                                    ": the time is " + (now ? readable(*now) : "not known"));
+  }
+
   /// Sets an external clock. @return the time before, if that was later; kInvalidInput.
   [[nodiscard]] Result<std::optional<Time>> set(Time time) {
     if (kind_ != ClockKind::kExternal) {
@@ -46,8 +72,8 @@ class SourceClock {
                   "the system's clock cannot be set: open with clock external");
     }
     if (auto ok = check_stamp(time); !ok) return tl::unexpected(std::move(ok.error()));
-    const std::int64_t before = told_.exchange(nanoseconds(time), std::memory_order_acq_rel);
-    if (before == kUntold) {
+    const std::int64_t before = told_.exchange(nanoseconds(time));
+    if (before == kUntold || waiting_.load() > 0) {
       // The lock prevents a notification between the check of a waiting thread and its sleep.
       { const Lock lock(mutex_); }
       first_.notify_all();
@@ -61,6 +87,7 @@ class SourceClock {
   std::atomic<std::int64_t> told_{kUntold};
   Mutex mutex_;  // of the wait only
   Condition first_;
+  std::atomic<int> waiting_{0};  // for a time
 };
 
 }  // namespace tfdude

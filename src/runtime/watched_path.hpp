@@ -30,8 +30,9 @@ namespace tfdude {
 class WatchedPath final : public Watched, public std::enable_shared_from_this<WatchedPath> {
  public:
   using Listener = std::function<void()>;
+  using ValueCallback = std::function<void(const Result<StampedTransform>&)>;
 
-  /// @param routes  calls WatchOptions::on_route
+  /// @param routes  calls WatchOptions::on_route; null: nothing is called, on_value() neither
   WatchedPath(std::string a, std::string b, WatchOptions options,
               std::shared_ptr<Callbacks::Line> routes = nullptr);
   /// The edges of these frames. lookup(Query) then has no result, and there is no common instant to
@@ -57,6 +58,8 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;
   /// See PathWatch::on_news(). @return keeps the listener; it may outlive this object
   [[nodiscard]] std::shared_ptr<void> on_news(Listener listener);
+  /// See PathWatch::on_value(). @return ends it
+  [[nodiscard]] std::shared_ptr<void> on_value(ValueCallback callback);
   /// Waits until the path is followed and its dynamic edges have a common instant; lack of the
   /// latter is no error.
   /// @return why it is not followed, at the deadline
@@ -95,9 +98,11 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] unsigned periods() const override { return 1; }
 
  private:
+  struct Values;
   struct Listeners {
     Mutex mutex;
     std::list<Listener> all TFDUDE_GUARDED_BY(mutex);
+    std::list<std::shared_ptr<Values>> values TFDUDE_GUARDED_BY(mutex);
   };
   struct Retired {
     std::uint64_t tag;

@@ -121,7 +121,7 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
   if constexpr (!std::is_same_v<Value, Pose> && !Edge::kRemote) {
     if (revised || said_of(edge) != nullptr) {
       CorrelatedValue ahead = extrapolate_correlated(before, newest, edge.X_PC, s, said_of(edge),
-                                                     samples.timing().drifts);
+                                                     edge.samples->timing().drifts);
       correlate_next(path, &ahead.correlation);
       Transform& X = path.place();
       X = ahead.X_PC;

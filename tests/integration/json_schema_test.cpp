@@ -154,6 +154,8 @@ TEST_CASE("json: what each command prints is as the schema says") {
   checked.run({"point", "world", "lower", "0", "0", "1", "--joint"});
   checked.run({"joint", "shoulder=0.25"});
   checked.run({"publish", directory.write("joints.jsonl", "{\"joints\": {\"shoulder\": 0.1}}")});
+  checked.run({"why", "world", "hand_left"});
+  checked.run({"why", "world", "hand_lfet"}, 1);
   checked.run({"velocity", "arm_1", "arm_2"});
   checked.run({"velocity", "world", "lower"});
   checked.run({"history", "arm_2"});

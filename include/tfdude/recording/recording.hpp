@@ -15,6 +15,7 @@
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/many.hpp"
 #include "tfdude/types/partition_info.hpp"
 #include "tfdude/types/partition_news.hpp"
 #include "tfdude/types/query.hpp"
@@ -94,6 +95,14 @@ class TFDUDE_EXPORT Recording {
   [[nodiscard]] Result<StampedTransform> lookup_at(std::string_view a, Time at_a,
                                                    std::string_view b, Time at_b,
                                                    std::string_view fixed, const Query& query = {});
+
+  /// X_AB at many instants, in any order: each as lookup_at() answers it, but the file is read
+  /// once, from the first instant on. Then the recording shows where the reading has ended.
+  /// @param query  Query::at is not used
+  /// @param wait  for each instant, of the time of the recording
+  [[nodiscard]] Trajectory trajectory(std::string_view a, std::string_view b,
+                                      const std::vector<Time>& instants, const Query& query = {},
+                                      Milliseconds wait = Milliseconds(10'000));
 
   // As the functions of Client, at the instant that is shown.
   [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b) const;

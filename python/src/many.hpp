@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <pybind11/pybind11.h>
+
+#include "tfdude/types/many.hpp"
+
+namespace tfdude::python {
+
+namespace py = pybind11;
+
+/// Many instants: int64 or float64 arrays (ns, s), datetime64, or a sequence of instants.
+[[nodiscard]] std::vector<Time> to_instants(py::handle at);
+/// The same, but also None, or a single one. @param many  whether it was several
+[[nodiscard]] std::vector<std::optional<Time>> to_stamps(py::handle at, bool& many);
+
+/// X_AB at many instants, as an object of Python.
+[[nodiscard]] py::object trajectory_object(Trajectory trajectory, std::vector<Time> instants);
+
+}  // namespace tfdude::python

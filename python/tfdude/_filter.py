@@ -1,0 +1,173 @@
+"""Messages with stamps, held back until the transform of their frame can be had."""
+
+from __future__ import annotations
+
+import collections
+import collections.abc
+import math
+import select
+import time
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from . import _core, _errors
+from ._aio import _until_readable
+
+if TYPE_CHECKING:
+    from ._core import _Duration, _Instant
+
+Message = TypeVar("Message")
+
+
+class _Waiting(Generic[Message]):
+    __slots__ = ("answer", "lookup", "message")
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
+        self.lookup: _core._PendingLookup | None = None
+        self.answer: _core.StampedTransform | _errors.TransformException | None = None
+
+
+class MessageFilter(Generic[Message]):
+    """Holds messages back until their transform can be had, as tf2_ros.MessageFilter.
+
+        filter = tfdude.MessageFilter(client, "map")
+        filter.push(scan, "lidar", stamp)             # in any thread
+        for scan, X in filter:                        # or: async for
+            ...
+
+    target: the frame in which each message's frame is wanted. max_age [s]: how long a message waits. most: messages that
+    wait; one more drops the oldest. in_order: as pushed; otherwise each as soon as its transform can be had.
+    on_dropped(message, error): called by the thread that asks for messages, once for each that is dropped: its age
+    (the error says what was missing), the number ('too_much'), or data that is no longer kept.
+
+    A loop ends when close() was called and nothing waits any more.
+    """
+
+    def __init__(
+        self,
+        client: _core.Client,
+        target: str,
+        *,
+        max_age: _Duration = 1.0,
+        most: int = 100,
+        in_order: bool = False,
+        extrapolate: _Duration = 0.0,
+        on_dropped: collections.abc.Callable[[Message, _errors.TransformException], object] | None = None,
+    ) -> None:
+        self._client = client
+        self._query: tuple[Any, ...] = (max_age, extrapolate, None, 2)
+        self._target = target
+        self._most = max(most, 1)
+        self._in_order = in_order
+        self._on_dropped = on_dropped
+        self._mailbox = _core._Mailbox()
+        # By key, in the order in which they were pushed.
+        self._waiting: collections.OrderedDict[int, _Waiting[Message]] = collections.OrderedDict()
+        self._ready: collections.deque[_Waiting[Message]] = collections.deque()
+        self._key = 0
+        self._closed = False
+
+    def push(self, message: Message, frame: str, stamp: _Instant) -> None:
+        """Passes a message on as soon as its transform is there. Does not wait."""
+        if self._closed:
+            raise ValueError("the filter is closed")
+        self._key += 1
+        key = self._key
+        entry = _Waiting(message)
+        self._waiting[key] = entry
+        max_age, *rest = self._query
+        try:
+            entry.lookup = self._client._start_lookup(
+                self._mailbox, key, self._target, frame, stamp, max_age, *rest
+            )
+        except BaseException:
+            self._waiting.pop(key, None)
+            raise
+        if len(self._waiting) > self._most:
+            _, oldest = self._waiting.popitem(last=False)
+            oldest.answer = _errors.make("too_much", f"more than {self._most} messages wait")
+            self._done(oldest)
+            self._mailbox.wake()
+
+    def __len__(self) -> int:
+        """The number of messages that wait."""
+        return len(self._waiting)
+
+    def close(self) -> None:
+        """Nothing more is pushed; a loop ends after what waits."""
+        self._closed = True
+        self._mailbox.wake()
+
+    def get(self, timeout: float | None = None) -> tuple[Message, _core.StampedTransform] | None:
+        """The next message and its transform; None after timeout [s] (None: without limit), or if nothing comes."""
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        while (found := self._next()) is None and not self._over():
+            left = deadline - time.monotonic()
+            if left < 0:
+                break
+            select.select([self._mailbox], [], [], min(left, 0.1))
+        return found
+
+    def __iter__(self) -> collections.abc.Iterator[tuple[Message, _core.StampedTransform]]:
+        while (found := self.get()) is not None:
+            yield found
+
+    async def __aiter__(self) -> collections.abc.AsyncIterator[tuple[Message, _core.StampedTransform]]:
+        while True:
+            found = self._next()
+            if found is not None:
+                yield found
+            elif self._over():
+                return
+            else:
+                await _until_readable(self._mailbox)
+
+    def _over(self) -> bool:
+        return (self._closed or self._client.closed) and not self._waiting and not self._ready
+
+    def _done(self, entry: _Waiting[Message]) -> None:
+        if entry.lookup is not None:
+            entry.lookup.cancel()
+        self._ready.append(entry)
+
+    def _next(self) -> tuple[Message, _core.StampedTransform] | None:
+        for key, answer in self._mailbox.take():
+            entry = self._waiting.get(key)
+            if entry is None:
+                continue  # displaced
+            entry.answer = answer
+            if not self._in_order:
+                self._done(self._waiting.pop(key))
+        while self._in_order and self._waiting:
+            key, entry = next(iter(self._waiting.items()))
+            if entry.answer is None:
+                break
+            self._done(self._waiting.pop(key))
+        while self._ready:
+            entry = self._ready.popleft()
+            if isinstance(entry.answer, _core.StampedTransform):
+                return entry.message, entry.answer
+            if self._on_dropped is not None:
+                assert isinstance(entry.answer, _errors.TransformException)
+                self._on_dropped(entry.message, entry.answer)
+        return None
+
+
+def filter_messages(
+    client: _core.Client,
+    target: str,
+    messages: collections.abc.Iterable[tuple[Message, str, _Instant]],
+    **options: Any,
+) -> collections.abc.Iterator[tuple[Message, _core.StampedTransform]]:
+    """Yields (message, transform) for each (message, frame, stamp) of an iterable, as soon as it can be had.
+
+    Messages are taken from the iterable one by one, and those that are ready are yielded in between; at its end, all
+    that still wait. options: as of MessageFilter.
+    """
+    waiting: MessageFilter[Message] = MessageFilter(client, target, **options)
+    for message, frame, stamp in messages:
+        waiting.push(message, frame, stamp)
+        while (found := waiting.get(timeout=0)) is not None:
+            yield found
+    waiting.close()
+    yield from waiting

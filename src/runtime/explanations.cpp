@@ -1,0 +1,366 @@
+#include "runtime/explanations.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "base/similar.hpp"
+#include "calls/lookup_in_progress.hpp"
+#include "math/variance_shares.hpp"
+#include "partition/observing.hpp"
+#include "runtime/member_runner.hpp"
+
+namespace tfdude {
+namespace {
+
+// How long owners are waited for: for people, who then learn which owner is silent.
+constexpr Milliseconds kPatience{80};
+// Clocks of hosts that differ by more than this are told.
+constexpr std::chrono::milliseconds kClockDiffers{5};
+
+// The edges of a path at one instant.
+class PathEdgesTask final : public Task {
+ public:
+  PathEdgesTask(const Forest& forest, std::string a, std::string b, std::optional<Time> at)
+      : forest_(forest), a_(std::move(a)), b_(std::move(b)), at_(at) {}
+
+  [[nodiscard]] std::vector<std::string> frames() const override { return {a_, b_}; }
+  [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point) override {
+    auto planned = route_observe(forest_, directory, a_, b_, {}, at_);
+    if (!planned) return tl::unexpected(std::move(planned.error()));
+    plan_ = *std::move(planned);
+    return {};
+  }
+  [[nodiscard]] std::vector<Part>& parts() override { return plan_.parts; }
+  [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point) override {
+    auto answers = values_of(std::move(replies));
+    if (!answers) return tl::unexpected(std::move(answers.error()));
+    auto path = observed_path(plan_, *answers);
+    if (!path) return tl::unexpected(std::move(path.error()));
+    edges_ = std::move(path->edges);
+    return Next::kDone;
+  }
+
+  /// Once it is done.
+  [[nodiscard]] const std::vector<ObservedEdge>& edges() const { return edges_; }
+  [[nodiscard]] const FrameInfo& info(std::size_t k) const { return plan_.edges[k].info; }
+
+ private:
+  const Forest& forest_;
+  const std::string a_;
+  const std::string b_;
+  const std::optional<Time> at_;
+  ObservePlan plan_;
+  std::vector<ObservedEdge> edges_;
+};
+
+std::vector<VarianceShare> sorted(std::vector<VarianceShare> shares, double total) {
+  for (VarianceShare& one : shares) one.share = total > 0 ? one.variance / total : 0;
+  shares.erase(std::remove_if(shares.begin(), shares.end(),
+                              [](const VarianceShare& one) { return one.variance == 0; }),
+               shares.end());
+  std::stable_sort(shares.begin(), shares.end(),
+                   [](const auto& x, const auto& y) { return x.variance > y.variance; });
+  return shares;
+}
+
+}  // namespace
+
+Explanation Explanations::why(const std::string& a, const std::string& b, const WhyQuery& query) {
+  const Deadline deadline =
+      discovery_.complete() ? Deadline(std::min(kPatience, timeout_)) : discovery_.call_deadline();
+  Query lookup;
+  lookup.at = query.at;
+  Explanation explanation;
+  auto found = lookups_.lookup<std::string_view>(a, b, lookup, deadline);
+  if (!found) {
+    explanation.cause = cause_of(std::move(found.error()), a, b, query);
+    return explanation;
+  }
+  explanation.X_AB = *std::move(found);
+  divide(a, b, query, explanation);
+  if (const auto edges = structure_.forest.edges(a, b)) {
+    add_ages(owners_of(*edges), explanation);
+  }
+  return explanation;
+}
+
+void Explanations::divide(const std::string& a, const std::string& b, const WhyQuery& query,
+                          Explanation& explanation) {
+  const StampedTransform& X_AB = *explanation.X_AB;
+  const PathFunctional functional = worst_direction(X_AB);
+  explanation.direction = functional.direction;
+  explanation.is_rotation = functional.is_rotation;
+  const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
+  explanation.variance = functional.gradient.dot(sigma * functional.gradient);
+  PathEdgesTask task(structure_.forest, a, b, X_AB.stamp);
+  if (!requests_.run(task, discovery_.call_deadline())) return;
+  Eigen::Matrix<double, 6, 1> sensor;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const double stddev = query.sensor[static_cast<std::size_t>(i)];
+    sensor[i] = std::max(stddev * stddev, 1e-24);
+  }
+  const VarianceShares shares = variance_shares(task.edges(), functional, sensor);
+  std::vector<VarianceShare> edges;
+  std::vector<VarianceShare> moved;
+  std::map<std::string, std::string> joint_of;  // by frame
+  std::vector<std::string> asked;
+  for (std::size_t k = 0; k < task.edges().size(); ++k) {
+    const std::string owner = owner_name(task.info(k).owner);
+    if (std::find(asked.begin(), asked.end(), owner) != asked.end()) continue;
+    asked.push_back(owner);
+    const auto joints = joints_.list(owner);
+    if (!joints) continue;
+    for (const JointInfo& joint : *joints) {
+      joint_of[joint.frame] = joint.name;
+      const auto on_path = [&](std::size_t i) { return task.info(i).id == joint.frame; };
+      for (std::size_t i = 0; i < task.edges().size(); ++i) {
+        if (!joint.measured && on_path(i)) explanation.assumed_joints.push_back(joint.name);
+      }
+    }
+  }
+  std::optional<std::size_t> best;
+  for (std::size_t k = 0; k < task.edges().size(); ++k) {
+    const FrameInfo& edge = task.info(k);
+    edges.push_back({edge.id, shares.edges[k], 0});
+    const auto joint = joint_of.find(edge.id);
+    if (joint != joint_of.end()) moved.push_back({joint->second, shares.edges[k], 0});
+    if (!best || shares.after[k] < shares.after[*best]) best = k;
+  }
+  std::vector<VarianceShare> sources;
+  for (const auto& [name, variance] : shares.sources) sources.push_back({name, variance, 0});
+  explanation.edges = sorted(std::move(edges), shares.total);
+  explanation.sources = sorted(std::move(sources), shares.total);
+  explanation.joints = sorted(std::move(moved), shares.total);
+  if (best && shares.after[*best] < shares.total) {
+    const FrameInfo& edge = task.info(*best);
+    explanation.best =
+        PossibleMeasurement{edge.parent, edge.id, std::max(shares.after[*best], 0.0)};
+  }
+}
+
+std::string Explanations::owner_name(Owner owner) {
+  const Lock lock(structure_.mutex);
+  return structure_.directory.name(owner);
+}
+
+Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges) {
+  Owners owners;
+  std::vector<Part> parts;
+  for (const FrameInfo& edge : edges) {
+    const std::string name = owner_name(edge.owner);
+    if (std::find(owners.order.begin(), owners.order.end(), name) == owners.order.end()) {
+      owners.order.push_back(name);
+    }
+    parts.push_back({edge.owner, name, Request{0, edge.id, HistoryRequest{}}});
+  }
+  const std::vector<Reply> replies = requests_.ask(parts, Deadline(std::min(kPatience, timeout_)));
+  for (std::size_t i = 0; i < replies.size(); ++i) {
+    const auto* error = std::get_if<Error>(&replies[i].body);
+    if (error != nullptr && error->code == Errc::kTimeout && owners.silent.empty()) {
+      owners.silent = parts[i].partition;
+    }
+    const auto* histories = std::get_if<std::vector<HistoryInfo>>(&replies[i].body);
+    if (histories == nullptr || histories->empty()) continue;
+    const HistoryInfo& history = histories->front();
+    // A static edge is listed if it has refused samples.
+    if (!history.newest && history.refused_ahead > 0) continue;
+    owners.dynamic.push_back({edges[i].id, parts[i].partition, history.oldest, history.newest});
+  }
+  return owners;
+}
+
+void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
+  const auto now = structure_.clock.now();
+  for (const std::string& name : owners.order) {
+    OwnerAge age{name};
+    age.reachable = name != owners.silent;
+    for (const EdgeHistory& edge : owners.dynamic) {
+      if (edge.partition != name || !edge.newest) continue;
+      if (age.newest && *age.newest <= *edge.newest) continue;
+      age.slowest = edge.id;
+      age.newest = edge.newest;
+    }
+    if (age.newest && now) age.age = *now - *age.newest;
+    explanation.owners.push_back(std::move(age));
+  }
+}
+
+// ---- why there is no answer
+
+Cause Explanations::cause_of(Error error, const std::string& a, const std::string& b,
+                             const WhyQuery& query) {
+  Cause cause;
+  cause.error = std::move(error);
+  // What is missing at the time limit is no longer an error of its own, but is still missing.
+  for (const std::string& id : {a, b}) {
+    if (!structure_.forest.exists(id)) {
+      explain_unknown(id, cause);
+      return cause;
+    }
+  }
+  const auto edges = structure_.forest.edges(a, b);
+  if (!edges) {
+    explain_apart(a, b, cause);
+    return cause;
+  }
+  explain_absent(*edges, cause);
+  if (cause.obstacle != Obstacle::kOther) return cause;
+  const Owners owners = owners_of(*edges);
+  if (!owners.silent.empty()) {
+    cause.obstacle = Obstacle::kOwnerSilent;
+    cause.partition = owners.silent;
+    const auto of_it = [&](const FrameInfo& edge) {
+      return owner_name(edge.owner) == owners.silent;
+    };
+    const auto edge = std::find_if(edges->begin(), edges->end(), of_it);
+    if (edge != edges->end()) cause.frame = edge->id;
+    cause.needs = "partition " + quote(owners.silent) +
+                  " is there, but does not answer: its process hangs, or the network loses its "
+                  "replies";
+    return cause;
+  }
+  const bool of_time = cause.error.code == Errc::kNotYet || cause.error.code == Errc::kTooOld;
+  if (of_time) explain_time(owners, query, cause);
+  return cause;
+}
+
+std::vector<std::string> Explanations::names_like(const std::string& id) {
+  std::vector<std::string> ids;
+  for (FrameInfo& frame : structure_.forest.frames()) ids.push_back(std::move(frame.id));
+  return similar_names(id, ids);
+}
+
+void Explanations::explain_unknown(const std::string& id, Cause& cause) {
+  cause.obstacle = Obstacle::kUnknownFrame;
+  cause.frame = id;
+  cause.similar = names_like(id);
+  if (!structure_.forest.frames().empty()) {
+    cause.needs = "a frame " + quote(id) + ": add it, or start the partition that has it";
+    return;
+  }
+  cause.obstacle = Obstacle::kNobody;
+  cause.needs =
+      "no partition has been found: start one, or see `tfdude doctor` (domain, profile, "
+      "network, keys)";
+}
+
+void Explanations::explain_apart(const std::string& a, const std::string& b, Cause& cause) {
+  const auto top_of = [&](const std::string& id) {
+    auto frame = structure_.forest.info(id);
+    while (frame && frame->attached && !frame->parent.empty()) {
+      auto above = structure_.forest.info(frame->parent);
+      if (!above) break;
+      frame = std::move(above);
+    }
+    return frame;
+  };
+  const auto top_a = top_of(a);
+  const auto top_b = top_of(b);
+  for (const auto& top : {top_a, top_b}) {
+    if (!top || top->parent.empty()) continue;
+    cause.obstacle = Obstacle::kMissingParent;
+    cause.frame = top->id;
+    cause.partition = owner_name(top->owner);
+    cause.similar = names_like(top->parent);
+    cause.needs = "a frame " + quote(top->parent) + ", which frame " + quote(top->id) +
+                  " names as its parent";
+    return;
+  }
+  cause.obstacle = Obstacle::kNotConnected;
+  if (!top_a || !top_b) return;
+  cause.frame = top_b->id;
+  cause.partition = owner_name(top_b->owner);
+  cause.needs = "the roots " + quote(top_a->id) + " and " + quote(top_b->id) +
+                " have nothing in common: one of them needs a parent in the tree of the other";
+}
+
+void Explanations::explain_absent(const std::vector<FrameInfo>& edges, Cause& cause) {
+  const Lock lock(structure_.mutex);
+  const Directory& directory = structure_.directory;
+  for (const FrameInfo& edge : edges) {
+    if (edge.owner == kHeldHere || directory.reachable(edge.owner)) continue;
+    const PartitionInfo& info = directory.info(edge.owner);
+    cause.obstacle = info.stopped ? Obstacle::kOwnerStopped : Obstacle::kOwnerLost;
+    cause.frame = edge.id;
+    cause.partition = info.name;
+    cause.since = info.since;
+    cause.needs = "partition " + quote(info.name) + " again" +
+                  (info.host.empty() ? ""
+                                     : ", which ran on host " + info.host + " as process " +
+                                           std::to_string(info.pid));
+    return;
+  }
+}
+
+bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {
+  const Lock lock(structure_.mutex);
+  for (const std::string& name : owners.order) {
+    const auto owner = structure_.directory.owner(name);
+    if (!owner || *owner == kHeldHere) continue;
+    const auto clock = structure_.directory.info(*owner).clock;
+    if (!clock || *clock == structure_.clock.kind()) continue;
+    cause.obstacle = Obstacle::kOtherClock;
+    cause.partition = name;
+    cause.needs = "partition " + quote(name) + " uses the " + to_string(*clock) +
+                  " clock, and this participant the " + to_string(structure_.clock.kind()) +
+                  " clock: all must use the same";
+    return true;
+  }
+  return false;
+}
+
+void Explanations::explain_time(const Owners& owners, const WhyQuery& query, Cause& cause) {
+  const EdgeHistory* first_to_end = nullptr;
+  const EdgeHistory* last_to_begin = nullptr;
+  const EdgeHistory* none = nullptr;
+  for (const EdgeHistory& edge : owners.dynamic) {
+    if (!edge.newest) {
+      if (none == nullptr) none = &edge;
+      continue;
+    }
+    if (first_to_end == nullptr || *edge.newest < *first_to_end->newest) first_to_end = &edge;
+    if (last_to_begin == nullptr || *edge.oldest > *last_to_begin->oldest) last_to_begin = &edge;
+  }
+  const auto blame = [&](Obstacle obstacle, const EdgeHistory& edge, std::string needs) {
+    cause.obstacle = obstacle;
+    cause.frame = edge.id;
+    cause.partition = edge.partition;
+    cause.since = obstacle == Obstacle::kBeginsAfter ? edge.oldest : edge.newest;
+    cause.needs = std::move(needs);
+  };
+  if (none != nullptr) {
+    blame(Obstacle::kNoSample, *none, "a first sample of the edge of " + quote(none->id));
+  } else if (query.at && has_other_clock(owners, cause)) {
+    return;
+  } else if (query.at && first_to_end != nullptr && *first_to_end->newest < *query.at) {
+    blame(Obstacle::kEndsBefore, *first_to_end,
+          "a sample of the edge of " + quote(first_to_end->id) + " at or after " +
+              readable(*query.at) + "; its newest one is " +
+              readable(*query.at - *first_to_end->newest) + " older");
+  } else if (query.at && last_to_begin != nullptr && *last_to_begin->oldest > *query.at) {
+    blame(Obstacle::kBeginsAfter, *last_to_begin,
+          "a later instant: the oldest sample that is kept of the edge of " +
+              quote(last_to_begin->id) + " is " + readable(*last_to_begin->oldest - *query.at) +
+              " after it; or a longer history");
+  } else if (!query.at && first_to_end != nullptr &&
+             *first_to_end->newest < *last_to_begin->oldest) {
+    if (has_other_clock(owners, cause)) return;
+    blame(Obstacle::kNoCommonInstant, *first_to_end,
+          "a sample of the edge of " + quote(first_to_end->id) + " at or after " +
+              readable(*last_to_begin->oldest) + ", when the edge of " + quote(last_to_begin->id) +
+              " of partition " + quote(last_to_begin->partition) + " begins");
+  }
+  if (cause.partition.empty()) return;
+  const auto difference = queries_.clock_difference(cause.partition);
+  if (!difference) return;
+  const std::chrono::nanoseconds ahead = difference->ahead;
+  const bool differs = std::max(ahead, -ahead) > kClockDiffers + difference->error;
+  if (!differs) return;
+  cause.clock_ahead = ahead;
+  cause.needs += "; the clock of its host is " + readable(ahead.count() < 0 ? -ahead : ahead) +
+                 (ahead.count() < 0 ? " behind" : " ahead of") + " the one here";
+}
+
+}  // namespace tfdude

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tfdude/types/explanation.hpp"
+
+#include "runtime/context.hpp"
+#include "runtime/joint_calls.hpp"
+#include "runtime/lookups.hpp"
+#include "runtime/queries.hpp"
+#include "runtime/requests.hpp"
+
+namespace tfdude {
+
+/// Says why an answer is as it is, or why there is none. Client describes the return values.
+/// @par Thread safety  All functions are thread-safe.
+class Explanations {
+ public:
+  Explanations(const Context& context, Lookups& lookups, Queries& queries, JointCalls& joints)
+      : structure_(context.structure),
+        discovery_(context.discovery),
+        requests_(context.requests),
+        timeout_(context.options.timeout),
+        lookups_(lookups),
+        queries_(queries),
+        joints_(joints) {}
+
+  [[nodiscard]] Explanation why(const std::string& a, const std::string& b, const WhyQuery& query);
+
+ private:
+  // The samples of a dynamic edge.
+  struct EdgeHistory {
+    std::string id;
+    std::string partition;
+    std::optional<Time> oldest;
+    std::optional<Time> newest;
+  };
+  // What the owners of a path say.
+  struct Owners {
+    std::vector<std::string> order;    // of the path
+    std::vector<EdgeHistory> dynamic;  // of its edges
+    std::string silent;                // the first that does not answer; empty: all do
+  };
+
+  void divide(const std::string& a, const std::string& b, const WhyQuery& query,
+              Explanation& explanation);
+  [[nodiscard]] Owners owners_of(const std::vector<FrameInfo>& edges);
+  void add_ages(const Owners& owners, Explanation& explanation);
+
+  [[nodiscard]] Cause cause_of(Error error, const std::string& a, const std::string& b,
+                               const WhyQuery& query);
+  void explain_unknown(const std::string& id, Cause& cause);
+  void explain_apart(const std::string& a, const std::string& b, Cause& cause);
+  void explain_absent(const std::vector<FrameInfo>& edges, Cause& cause);
+  void explain_time(const Owners& owners, const WhyQuery& query, Cause& cause);
+  [[nodiscard]] bool has_other_clock(const Owners& owners, Cause& cause);
+  [[nodiscard]] std::string owner_name(Owner owner);
+  [[nodiscard]] std::vector<std::string> names_like(const std::string& id);
+
+  Structure& structure_;
+  Discovery& discovery_;
+  Requests& requests_;
+  const Milliseconds timeout_;
+  Lookups& lookups_;
+  Queries& queries_;
+  JointCalls& joints_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,85 @@
+#include "runtime/many_lookups.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include "calls/instants_task.hpp"
+#include "calls/lookup_many_task.hpp"
+#include "types/trajectory_builder.hpp"
+
+namespace tfdude {
+namespace {
+
+bool is_of_time(Errc code) { return code == Errc::kNotYet || code == Errc::kTooOld; }
+
+}  // namespace
+
+std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<FramePair>& pairs,
+                                                         const Query& query,
+                                                         const Deadline& deadline) {
+  LookupManyTask task(structure_.forest, structure_.clock.kind(), hints_, pairs, query);
+  auto asked = requests_.run(task, deadline);
+  // Those that do not exist are known by now: the others are asked for without them.
+  if (!asked && task.settle(asked.error())) {
+    asked = requests_.run(task, deadline.over() ? Deadline(timeout_) : deadline);
+  }
+  if (!asked) task.fail_all(asked.error());
+  return std::move(task.found());
+}
+
+std::vector<ManyLookups::Found> ManyLookups::lookup(const std::vector<FramePair>& pairs,
+                                                    const Query& query, Milliseconds wait) {
+  const Deadline until(wait);
+  while (true) {
+    auto found = lookup_once(pairs, query, discovery_.call_deadline());
+    if (wait <= Milliseconds(0) || until.over()) return found;
+    std::size_t i = 0;
+    while (i < found.size() && (found[i] || !is_worth_waiting(found[i].error(), query))) ++i;
+    if (i == found.size()) return found;
+    (void)lookups_.wait(pairs[i].a, pairs[i].b, query, until.left());
+  }
+}
+
+Result<Trajectory> ManyLookups::trajectory(std::string_view a, std::string_view b,
+                                           const std::vector<Time>& instants, const Query& query,
+                                           Milliseconds wait) {
+  TrajectoryBuilder all(instants.size());
+  Query at = query;
+  if (wait > Milliseconds(0) && !instants.empty()) {
+    at.at = *std::max_element(instants.begin(), instants.end());
+    (void)lookups_.wait(a, b, at, wait);
+  }
+  const Forest& forest = structure_.forest;
+  const auto from = forest.find(a);
+  const auto to = forest.find(b);
+  std::size_t i = 0;
+  while (from && to && i < instants.size()) {
+    at.at = instants[i];
+    const auto found = forest.lookup(*from, *to, at);
+    if (!found && !is_of_time(found.error().code)) break;
+    all.add(i++, found);
+  }
+  while (i < instants.size()) {
+    // No message can name an instant before zero.
+    if (instants[i] < Time{}) {
+      at.at = instants[i];
+      all.add(i, lookups_.lookup(a, b, at));
+      ++i;
+      continue;
+    }
+    const auto begin = instants.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto most =
+        begin + static_cast<std::ptrdiff_t>(std::min(instants.size() - i, InstantsTask::kMost));
+    const auto end = std::find_if(begin, most, [](Time t) { return t < Time{}; });
+    InstantsTask task(forest, structure_.clock.kind(), {std::string(a), std::string(b), query},
+                      {begin, end});
+    auto asked = requests_.run(task, discovery_.call_deadline());
+    if (!asked) return tl::unexpected(std::move(asked.error()));
+    for (const auto& found : task.found()) all.add(i++, found);
+  }
+  return std::move(all).take();
+}
+
+}  // namespace tfdude

@@ -1,0 +1,281 @@
+// Waits of calls that read, and being told: watched values, messages with stamps, the clock.
+
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tfdude/client/client.hpp"
+#include "tfdude/client/message_filter.hpp"
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/networks.hpp"
+#include "support/process.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::ContainsSubstring;
+using testing::eventually;
+
+Time instant(int ms) { return Time(std::chrono::seconds(1'000'000)) + Milliseconds(ms); }
+
+Transform ahead(double x) {
+  return Transform::exact(Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}));
+}
+
+Query at(int ms) {
+  Query query;
+  query.at = instant(ms);
+  return query;
+}
+
+struct World {
+  testing::Join join = testing::join_loopback();
+  Node node =
+      Node::open(join("base"), "base",
+                 {{"world", "", {}}, {"base", "world", ahead(0)}, {"tip", "base", ahead(1)}})
+          .value();
+  Client client = Client::open(join("")).value();
+};
+
+// Runs a call that has to wait, and what it waits for.
+template <class Call, class Then>
+auto after(Call call, Then then) {
+  std::atomic<bool> begun{false};
+  std::thread later([&] {
+    (void)eventually([&] { return begun.load(); });
+    std::this_thread::sleep_for(5ms);
+    then();
+  });
+  begun = true;
+  auto result = call();
+  later.join();
+  return result;
+}
+
+// What a filter has passed on.
+struct Passed {
+  void add(const std::string& what) {
+    const std::lock_guard lock(mutex);
+    all.push_back(what);
+  }
+  [[nodiscard]] std::vector<std::string> now() {
+    const std::lock_guard lock(mutex);
+    return all;
+  }
+  [[nodiscard]] bool gets(std::size_t count) {
+    return eventually([&] { return now().size() >= count; });
+  }
+  std::mutex mutex;
+  std::vector<std::string> all;
+};
+
+}  // namespace
+
+TEST_CASE("waiting: each call that reads waits for frames and data") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(1), instant(0)));
+  Client& client = world.client;
+  CHECK(client.can_lookup("world", "tip", at(10)).error().code == Errc::kNotYet);
+  int ms = 0;
+  const auto next = [&] {
+    ms += 10;
+    return [&world, ms] { CHECK(world.node.update("base", ahead(ms), instant(ms))); };
+  };
+  CHECK(after([&] { return client.can_lookup("world", "tip", at(ms), 20s); }, next()));
+  const auto X =
+      after([&] { return client.transform("world", "tip", ahead(1), at(ms), 20s); }, next());
+  REQUIRE(X);
+  CHECK(X->pose.translation().x() == 22);
+  CHECK(after([&] { return client.transform("world", "tip", std::vector<Point>{{}}, at(ms), 20s); },
+              next()));
+  CHECK(after([&] { return client.lookup("tip", at(0), "tip", at(ms), "world", 20s); }, next()));
+  CHECK(after([&] { return client.velocity("world", "tip", {instant(ms), 10ms}, 20s); }, next()));
+  CHECK(after([&] { return client.trajectory("world", "tip", {instant(ms)}, {}, 20s); }, next())
+            ->missing.empty());
+  const auto watch = after([&] { return client.watch("world", "hand", {}, 20s); },
+                           [&] { CHECK(world.node.add("hand", "tip", ahead(1))); });
+  CHECK(watch);
+  // A wait ends in time, with the reason.
+  const auto never = client.can_lookup("world", "tip", at(100'000), 20ms);
+  REQUIRE_FALSE(never);
+  CHECK(never.error().code == Errc::kNotYet);
+  CHECK(client.watch("world", "nowhere", {}, 20ms).error().code == Errc::kUnknownEnd);
+}
+
+TEST_CASE("waiting: wait_next() returns each new value once, and the newest of several") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(1), instant(0)));
+  auto watch = world.client.watch("world", "base");
+  REQUIRE(watch);
+  const auto x_of = [](const Result<StampedTransform>& X) {
+    return X ? X->pose.translation().x() : -1;
+  };
+  CHECK(x_of(watch->wait_next(20s)) == 1);
+  const auto nothing = watch->wait_next(1ms);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().code == Errc::kTimeout);
+  CHECK_THAT(nothing.error().message, ContainsSubstring("'world'"));
+  PathWatch other = *watch;
+  REQUIRE(world.node.update("base", ahead(2), instant(10)));
+  CHECK(x_of(watch->wait_next(20s)) == 2);
+  CHECK(x_of(other.wait_next(20s)) == 2);  // each copy has its own place
+  REQUIRE(world.node.update("base", ahead(3), instant(20)));
+  REQUIRE(world.node.update("base", ahead(4), instant(30)));
+  double last = 0;
+  while (last != 4) {
+    const auto X = watch->wait_next(20s);
+    REQUIRE(X);
+    CHECK(X->pose.translation().x() > last);
+    last = X->pose.translation().x();
+  }
+  REQUIRE(world.node.remove("base"));
+  REQUIRE(eventually([&] { return !watch->latest(); }));
+  CHECK(watch->wait_next(1ms).error().code == watch->latest().error().code);
+}
+
+TEST_CASE("waiting: on_value() calls with the newest value, and with the reason at its end") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(1), instant(0)));
+  auto watch = world.client.watch("world", "base");
+  REQUIRE(watch);
+  Passed passed;
+  const auto note = [&](const Result<StampedTransform>& X) {
+    passed.add(X ? std::to_string(std::lround(X->pose.translation().x()))
+                 : std::string(to_string(X.error().code)));
+  };
+  Subscription values = watch->on_value(note);
+  REQUIRE(passed.gets(1));
+  CHECK(passed.now() == std::vector<std::string>{"1"});
+  REQUIRE(world.node.update("base", ahead(2), instant(10)));
+  REQUIRE(passed.gets(2));
+  CHECK(passed.now().back() == "2");
+  REQUIRE(world.node.remove("base"));
+  REQUIRE(passed.gets(3));
+  CHECK(passed.now().back() == "unknown_end");
+  values = Subscription();
+  REQUIRE(world.node.add("base", "world", ahead(5)));
+  REQUIRE(eventually([&] { return watch->latest().has_value(); }));
+  CHECK(passed.now().size() == 3);
+  // A callback may end its own subscription, and a slow one gets the newest next.
+  std::atomic<int> calls{0};
+  Subscription once;
+  std::mutex assigned;
+  {
+    const std::lock_guard lock(assigned);
+    once = watch->on_value([&](const Result<StampedTransform>&) {
+      const std::lock_guard wait(assigned);
+      ++calls;
+      once = Subscription();
+    });
+  }
+  REQUIRE(eventually([&] { return calls.load() == 1; }));
+  REQUIRE(world.node.update("base", ahead(6)));
+  CHECK(watch->wait_next(20s));
+  CHECK(calls.load() == 1);
+}
+
+TEST_CASE("waiting: a filter passes messages on when their transform can be had") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(0), instant(0)));
+  const bool in_order = GENERATE(false, true);
+  Passed passed;
+  MessageFilter<std::string> filter(
+      world.client, {"world", 20s, 4, in_order},
+      [&](const std::string& message, const StampedTransform& X) {
+        passed.add(message + " at " + std::to_string(std::lround(X.pose.translation().x())));
+      },
+      [&](const std::string& message, const Error& why) {
+        passed.add("no " + message + ": " + std::string(to_string(why.code)));
+      });
+  filter.push("later", "tip", instant(20));
+  filter.push("now", "tip", instant(0));
+  if (!in_order) {
+    REQUIRE(passed.gets(1));
+    CHECK(passed.now() == std::vector<std::string>{"now at 1"});
+  }
+  REQUIRE(world.node.update("base", ahead(20), instant(20)));
+  REQUIRE(passed.gets(2));
+  CHECK(passed.now().back() == (in_order ? "now at 1" : "later at 21"));
+  // Too old at once; too many: the oldest is displaced.
+  filter.push("old", "tip", instant(-5));
+  REQUIRE(passed.gets(3));
+  CHECK(passed.now().back() == "no old: too_old");
+  for (int i = 0; i < 5; ++i) filter.push("m" + std::to_string(i), "tip", instant(100 + i));
+  REQUIRE(passed.gets(4));
+  CHECK(passed.now().back() == "no m0: too_much");
+  CHECK(filter.waiting() == 4);
+}
+
+TEST_CASE("waiting: a filter drops messages by their age, and says what was missing") {
+  World world;
+  Passed passed;
+  MessageFilter<int> filter(
+      world.client, {"world", 10ms}, [](int, const StampedTransform&) {},
+      [&](int message, const Error& why) {
+        passed.add(std::to_string(message) + " " + std::string(to_string(why.code)));
+      });
+  filter.push(7, "nowhere", instant(0));
+  REQUIRE(passed.gets(1));
+  CHECK(passed.now() == std::vector<std::string>{"7 unknown_end"});
+}
+
+TEST_CASE("waiting: a filter may be used and destroyed by its own functions, and by any thread") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(0), instant(0)));
+  std::unique_ptr<MessageFilter<int>> filter;
+  std::atomic<int> passed{0};
+  std::atomic<bool> destroyed{false};
+  const auto on_ready = [&](int message, const StampedTransform&) {
+    ++passed;
+    if (message < 100) filter->push(message + 100, "tip", instant(0));
+    if (message == 199) {
+      filter.reset();
+      destroyed = true;
+    }
+  };
+  filter = std::make_unique<MessageFilter<int>>(
+      world.client, MessageFilterOptions{"world", 20s, 1000, true}, on_ready);
+  std::vector<std::thread> pushing;
+  for (int t = 0; t < 2; ++t) {
+    pushing.emplace_back([&, t] {
+      for (int i = 0; i < 49; ++i) filter->push(2 * i + t, "tip", instant(0));
+    });
+  }
+  for (std::thread& one : pushing) one.join();
+  filter->push(99, "tip", instant(0));
+  REQUIRE(eventually([&] { return destroyed.load(); }));
+  CHECK(passed.load() >= 100);
+  // What waits is cancelled.
+  {
+    MessageFilter<int> waits(world.client, {"world", 20s},
+                             [&](int, const StampedTransform&) { FAIL_CHECK("passed on"); });
+    waits.push(1, "tip", instant(1000));
+  }
+}
+
+TEST_CASE("waiting: until a time of the client's clock") {
+  const auto join = testing::join_loopback();
+  Options options;
+  options.clock = ClockKind::kExternal;
+  auto node = Node::open(join("sim"), "sim", {{"world", "", {}}}, options);
+  auto system = Client::open(join(""));
+  REQUIRE((node && system));
+  REQUIRE(node->set_time(instant(0)));
+  CHECK(node->wait_until(instant(0), 0ms));
+  const auto early = node->wait_until(instant(10), 5ms);
+  REQUIRE_FALSE(early);
+  CHECK(early.error().code == Errc::kTimeout);
+  CHECK(after([&] { return node->wait_until(instant(10), 20s); },
+              [&] { CHECK(node->set_time(instant(10))); }));
+  CHECK(system->wait_until(*system->now() + 10ms, 20s));
+  CHECK_FALSE(system->wait_until(*system->now() + std::chrono::hours(1), 1ms));
+}
+
+}  // namespace tfdude
