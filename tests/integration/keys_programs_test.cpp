@@ -19,6 +19,7 @@
 #include "support/catch.hpp"
 #include "support/dds_participant.hpp"
 #include "support/key_store.hpp"
+#include "support/stranger.hpp"
 #include "support/test_domain.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/peers.hpp"
@@ -134,6 +135,20 @@ TEST_CASE("keys: tfduded --check tells until when keys are valid, and whether th
     const CliResult refused = check(other);
     CHECK(refused.status == 2);
     CHECK_THAT(refused.err, ContainsSubstring("is not the daemon of this partition"));
+  }
+}
+
+// Fast DDS 2.9 handles unprotected messages of any endpoint.
+TEST_CASE("keys: huge ranges of sequence numbers silence no daemon") {
+  SecuredRobot robot(GENERATE(true, false));
+  testing::Stranger stranger(robot.domain.number());
+  for (int i = 0; i < 3; ++i) {
+    testing::send_huge_ranges(stranger, stranger.await_participants(2));
+    CHECK(robot.as("eye", {"lookup", "base", "secret_forearm"}).status == 0);
+  }
+  for (Process* daemon : {&*robot.arm, &*robot.base}) {
+    daemon->signal(SIGTERM);
+    CHECK(daemon->wait(testing::Clock::now() + 5s) == 0);
   }
 }
 

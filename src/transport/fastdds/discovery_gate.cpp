@@ -17,6 +17,9 @@ namespace {
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
 
+// Fast DDS 3 passes what it sends in pieces, which nobody reads here.
+constexpr bool kSeesSent = TFDUDE_FASTDDS_MAJOR == 2;
+
 // A domain has ports for so many participants of a host.
 constexpr std::uint32_t kParticipantsOfHost = 120;
 
@@ -34,7 +37,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   GatedDescriptor(std::shared_ptr<etransport::TransportDescriptorInterface> guarded, Flag flag,
                   bool of_client, DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
                   std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs,
-                  std::shared_ptr<Acknowledgements> acks)
+                  std::shared_ptr<Acknowledgements> acks,
+                  std::shared_ptr<DatagramGuard> datagram_guard)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         client(of_client),
@@ -42,7 +46,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
         discovering(std::move(one_by_one)),
         gate(std::move(inward)),
         life_signs(std::move(signs)),
-        acknowledgements(std::move(acks)) {}
+        acknowledgements(std::move(acks)),
+        guard(std::move(datagram_guard)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
@@ -62,6 +67,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<Gate> gate;
   std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<Acknowledgements> acknowledgements;
+  std::shared_ptr<DatagramGuard> guard;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -102,6 +108,9 @@ class GatedTransport final : public SendFilter {
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
                std::uint32_t size, const ertps::Locator_t& local,
                const ertps::Locator_t& remote) override {
+    const auto now = LifeSigns::Clock::now();
+    const auto sender = [&remote] { return ertps::IPLocator::ip_to_string(remote); };
+    if (!descriptor_.guard->admit(bytes, size, now, sender)) return;
     // Before the gate: whoever holds both may shut it.
     std::unique_lock<std::mutex> one_by_one;
     if (descriptor_.discovering != nullptr && !descriptor_.data_ports.contain(local.port)) {
@@ -109,7 +118,6 @@ class GatedTransport final : public SendFilter {
     }
     const Gate::Pass pass(*descriptor_.gate);
     if (!pass) return;
-    const auto now = LifeSigns::Clock::now();
     descriptor_.life_signs->heard(bytes, size, now);
     descriptor_.acknowledgements->heard(bytes, size);
     FairShare::begin(now);
@@ -121,6 +129,7 @@ class GatedTransport final : public SendFilter {
   std::uint32_t size_to_send(ertps::SenderResource* through, const ertps::octet* bytes,
                              std::uint32_t size) override {
     announces_through_ = is_announcement(bytes, size) ? through : nullptr;
+    descriptor_.guard->send(bytes, size);
     return size_without_statistics(bytes, size);
   }
 
@@ -224,6 +233,7 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
     data_ports.first = port.portBase + port.domainIDGain * domain + port.offsetd3;
     data_ports.step = port.participantIDGain;
   }
+  if (kSeesSent && only_udp(qos)) guard_->sees_all_sent();
   auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;
   leave_out_unused(qos);
   if (client) announce_eagerly(qos);
@@ -231,7 +241,7 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
     transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
-                                                  gate_, life_signs_, acknowledgements_);
+                                                  gate_, life_signs_, acknowledgements_, guard_);
   }
 }
 

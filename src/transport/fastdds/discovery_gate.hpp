@@ -7,6 +7,7 @@
 
 #include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
+#include "transport/fastdds/datagram_guard.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/life_signs.hpp"
 
@@ -37,12 +38,15 @@ class DiscoveryGate {
  public:
   /// @param gate  all datagrams received over UDP pass it
   /// @param life_signs, acknowledgements  are told of each of them
+  /// @param guard  decides which of them Fast DDS has
   DiscoveryGate(
       std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
-      std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>())
+      std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>(),
+      std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false))
       : gate_(std::move(gate)),
         life_signs_(std::move(life_signs)),
-        acknowledgements_(std::move(acknowledgements)) {}
+        acknowledgements_(std::move(acknowledgements)),
+        guard_(std::move(guard)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -63,6 +67,7 @@ class DiscoveryGate {
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<Acknowledgements> acknowledgements_;
+  const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

@@ -46,7 +46,8 @@ std::chrono::nanoseconds nanoseconds_of(const Duration& duration) {
 
 FastDdsTransport::FastDdsTransport(FastDdsOptions options)
     : options_(std::move(options)),
-      counters_(options_.counters ? options_.counters : std::make_shared<FastDdsCounters>()) {}
+      counters_(options_.counters ? options_.counters : std::make_shared<FastDdsCounters>()),
+      guard_(std::make_shared<DatagramGuard>(!options_.keys.empty())) {}
 
 Result<void> FastDdsTransport::start(TransportHandler& handler) {
   handler_ = &handler;

@@ -138,7 +138,8 @@ class FastDdsTransport final : public Transport {
   TransportHandler* handler_ = nullptr;
   const std::shared_ptr<LifeSigns> life_signs_ = std::make_shared<LifeSigns>();
   const std::shared_ptr<Acknowledgements> acknowledgements_ = std::make_shared<Acknowledgements>();
-  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_};
+  const std::shared_ptr<DatagramGuard> guard_;
+  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_, guard_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);
