@@ -112,7 +112,7 @@ void look_up_correlated(benchmark::State& state, Shape shape, Errors errors, Ord
   for (auto _ : state) benchmark::DoNotOptimize(node->lookup(a, b, query));
 }
 
-// The frames of a tree in turn: each owner has as many as the others, next to each other on the path.
+// Each owner has as many frames as the others, next to each other on the path.
 void look_up_read(benchmark::State& state, Shape shape, std::size_t owners) {
   const bench::Tree& tree = tree_of(shape);
   LoopbackNetwork network;

@@ -44,6 +44,8 @@ int Arguments::number(const std::string& name) const { return std::stoi(text(nam
 
 tfdude::Options Arguments::options(const std::string& domain_name) const {
   tfdude::Options options;
+  // What these programs measure are messages; core_bench measures lookups in memory.
+  options.shared_memory = false;
   options.domain = static_cast<std::uint32_t>(number(domain_name));
   options.profile = text("profile");
   if (values_.count("--keys") > 0) options.keys = text("keys");

@@ -95,7 +95,8 @@ void MemoryReads::attach_wanted() {
 }
 
 Result<MemoryOffer> MemoryReads::offer_of(const std::string& partition) {
-  auto offer = requests_.ask_partition<MemoryOffer>(partition, MemoryRequest{}, Deadline(timeout_));
+  auto offer = requests_.ask_partition<MemoryOffer>(partition, MemoryRequest{},
+                                                    Deadline(std::min(timeout_, kAnswersIn)));
   if (!offer) return tl::unexpected(std::move(offer.error()));
   if (*offer) return **std::move(offer);
   return fail(Errc::kUnsupported, "it gave another answer than that it was asked for");

