@@ -37,5 +37,5 @@ def _with_stamp(self: _core.StampedTransform) -> str:
 
 
 for _class, _names in _SHOWN.items():
-    _class.__repr__ = _repr_of(_names)  # type: ignore[method-assign]
-_core.StampedTransform.__repr__ = _with_stamp  # type: ignore[method-assign]
+    setattr(_class, "__repr__", _repr_of(_names))
+setattr(_core.StampedTransform, "__repr__", _with_stamp)
