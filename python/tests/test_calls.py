@@ -246,3 +246,14 @@ def test_what_a_prompt_shows(network, car):
     assert repr(car.velocity("odom", "base")).startswith("Velocity(linear=array([")
     assert repr(FrameSpec("a", "b")).startswith("FrameSpec(id='a', parent='b', X_PC=Transform(")
     assert repr(tfdude.Joint("j")) == "Joint(name='j', type='revolute', position=0.0, variance=None)"
+
+
+def test_ensure(network, car):
+    with tfdude.Client(network=network) as client:
+        client.ensure("cup", "odom", Transform.exact((1, 0, 0)))
+        client.ensure("cup", "odom", Transform.exact((2, 0, 0)))
+        assert client.lookup("odom", "cup").translation[0] == 2
+        client.ensure("cup", "base", Transform.exact((3, 0, 0)), START)
+        assert client.parent("cup") == "base" and client.lookup("base", "cup", START).translation[0] == 3
+        with pytest.raises(tfdude.LookupException):
+            client.ensure("cup", "moon", Transform())

@@ -2,6 +2,7 @@
 
 #include "tfdude/client/frame_source.hpp"
 
+#include "tfdude/client/broadcast.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/math/conversions.hpp"
 
@@ -70,6 +71,38 @@ TEST_CASE("frame source: a client, watched edges and a table answer the same") {
     CHECK(error.code() == Errc::kUnknownEnd);
     CHECK(std::string(error.what()) == error.error().message);
   }
+}
+
+TEST_CASE("broadcast: a frame is created, updated and moved, as a broadcaster of tf2 does") {
+  const auto join = testing::join_loopback();
+  auto node = Node::open(join("robot"), "robot", {{"world", "", {}}, {"table", "world", {}}});
+  auto client = Client::open(join(""));
+  REQUIRE((node && client));
+  const auto x_of = [&](const std::string& parent, const Query& query = {}) {
+    const auto X = client->lookup(parent, "cup", query);
+    return X ? X->pose.translation().x() : -1;
+  };
+  const auto ahead = [](double x) {
+    return Transform::exact(Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}));
+  };
+  REQUIRE(ensure(*client, "cup", "world", ahead(1)));
+  CHECK(x_of("world") == 1);
+  REQUIRE(ensure(*client, "cup", "world", ahead(2)));
+  CHECK(x_of("world") == 2);
+  REQUIRE(ensure(*client, "cup", "table", ahead(3)));
+  CHECK(x_of("table") == 3);
+  CHECK(client->parent("cup").value() == "table");
+  const Time begin(std::chrono::seconds(1'000'000));
+  REQUIRE(ensure(*client, "cup", "table", ahead(4), begin));
+  REQUIRE(ensure(*client, "cup", "table", ahead(6), begin + Milliseconds(10)));
+  Query query;
+  query.at = begin + Milliseconds(5);
+  CHECK(x_of("table", query) == 5);
+  // With a stamp a new frame is dynamic at once.
+  REQUIRE(client->remove("cup"));
+  REQUIRE(ensure(*client, "cup", "world", ahead(7), begin));
+  CHECK(client->lookup("world", "cup", query).error().code == Errc::kNotYet);
+  CHECK(ensure(*client, "cup", "moon", ahead(1)).error().code == Errc::kUnknownParent);
 }
 
 TEST_CASE("conversions: Eigen's transforms, angles, and Jacobians beside differences") {
