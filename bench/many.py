@@ -119,7 +119,8 @@ def spinning(node, rounds):
             out[i : i + 128] = node.lookup(*ends, int(stamps[i])).apply(points[i : i + 128])
 
     a, b = paired(rounds, lambda: node.transform_cloud(*ends, points, stamps=stamps).points, loop)
-    report(f"{len(points)} points with 1,800 stamps", a, b * 10, "a loop over lookup() and apply(), ten times that of 10 %")
+    report(f"{len(points)} points with 1,800 stamps", a, b * 10,
+           "a loop over lookup() and apply(), ten times that of 10 %")
 
 
 def many(network, rounds):
@@ -127,7 +128,12 @@ def many(network, rounds):
     with tfdude.Node("many", frames), tfdude.Client() as client:
         names = [f"link{i}" for i in range(100)]
         client.lookup("base", "link0", timeout=5)
-        a, b = paired(rounds * 5, lambda: client.lookup_many("base", names), lambda: [client.lookup("base", n) for n in names], clock=time.perf_counter)
+        a, b = paired(
+            rounds * 5,
+            lambda: client.lookup_many("base", names),
+            lambda: [client.lookup("base", name) for name in names],
+            clock=time.perf_counter,
+        )
         report("100 frames of another owner over DDS", a, b, "a loop over lookup()")
 
 

@@ -16,7 +16,8 @@ MS = 1_000_000
 @pytest.fixture
 def car(network):
     """A lidar on a base that drives in odom: 1 m a sample, 10 ms apart."""
-    frames = [FrameSpec("odom"), FrameSpec("base", "odom"), FrameSpec("lidar", "base", Transform((0, 0, 1), covariance=np.eye(6) * 1e-6))]
+    X_BL = Transform((0, 0, 1), covariance=np.eye(6) * 1e-6)
+    frames = [FrameSpec("odom"), FrameSpec("base", "odom"), FrameSpec("lidar", "base", X_BL)]
     with tfdude.Node("car", frames, network=network) as node:
         for i in range(11):
             node.update("base", Transform((i, 0, 0), stddev=[0.01] * 6), START + i * 10 * MS)
@@ -61,7 +62,8 @@ def test_trajectory(network, car):
                 trajectory[0]
         dates = (stamps[20:25]).astype("datetime64[ns]")
         assert np.allclose(car.trajectory("odom", "base", dates).poses[:, 0], np.arange(5) / 10)
-        assert np.allclose(car.trajectory("odom", "base", stamps[20:25] / 1e9).poses[:, 0], np.arange(5) / 10, atol=1e-4)
+        seconds = car.trajectory("odom", "base", stamps[20:25] / 1e9)
+        assert np.allclose(seconds.poses[:, 0], np.arange(5) / 10, atol=1e-4)
         assert len(car.trajectory("odom", "base", [])) == 0
         with pytest.raises(tfdude.LookupException):
             client.trajectory("odom", "nowhere", stamps)
@@ -232,3 +234,26 @@ def test_why(network, car):
             "car",
             START + 100 * MS,
         )
+
+
+def test_what_a_prompt_shows(network, car):
+    X = car.lookup("odom", "base")
+    assert repr(X).startswith("StampedTransform(translation=[10, 0, 0]") and repr(X).endswith(f"stamp={X.stamp})")
+    assert repr(car.lookup("base", "lidar")).endswith("stamp=None)")
+    assert repr(car.frames()[0]) == "Frame(id='base', parent='odom', partition='car', attached=True)"
+    assert repr(car.path("odom", "base")[0]) == "PathSegment(partition='car', start='odom', end='base')"
+    assert "name='car'" in repr(car.partitions()[0]) and "samples=11" in repr(car.history("base")[0])
+    assert repr(car.velocity("odom", "base")).startswith("Velocity(linear=array([")
+    assert repr(FrameSpec("a", "b")).startswith("FrameSpec(id='a', parent='b', X_PC=Transform(")
+    assert repr(tfdude.Joint("j")) == "Joint(name='j', type='revolute', position=0.0, variance=None)"
+
+
+def test_ensure(network, car):
+    with tfdude.Client(network=network) as client:
+        client.ensure("cup", "odom", Transform.exact((1, 0, 0)))
+        client.ensure("cup", "odom", Transform.exact((2, 0, 0)))
+        assert client.lookup("odom", "cup").translation[0] == 2
+        client.ensure("cup", "base", Transform.exact((3, 0, 0)), START)
+        assert client.parent("cup") == "base" and client.lookup("base", "cup", START).translation[0] == 3
+        with pytest.raises(tfdude.LookupException):
+            client.ensure("cup", "moon", Transform())

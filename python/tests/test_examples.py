@@ -69,6 +69,14 @@ def test_plot(tmp_path):
     assert (tmp_path / "hand.png").stat().st_size > 5000
 
 
+def test_scan_to_map():
+    lines = run(EXAMPLES / "scan_to_map.py", "--scans", "3").splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        at, thick, sigma, rigid = map(float, re.findall(r"(\d+\.\d+) m", line))
+        assert at == 30 and thick < 0.001 and 0.01 < sigma < 0.03 and rigid > 0.9
+
+
 def test_everything_public_says_what_it_is():
     for name in tfdude.__all__:
         thing = getattr(tfdude, name)

@@ -15,7 +15,7 @@ child frame. Errors are TransformException and its subclasses, which have tf2's 
 
 from __future__ import annotations
 
-from . import aio
+from . import _broadcast, _repr, aio  # noqa: F401
 from ._aio import Events
 from ._core import (
     Batch,

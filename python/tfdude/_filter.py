@@ -35,8 +35,8 @@ class MessageFilter(Generic[Message]):
         for scan, X in filter:                        # or: async for
             ...
 
-    target: the frame in which each message's frame is wanted. max_age [s]: how long a message waits. most: messages that
-    wait; one more drops the oldest. in_order: as pushed; otherwise each as soon as its transform can be had.
+    target: the frame in which each message's frame is wanted. max_age [s]: how long a message waits. most: messages
+    that wait; one more drops the oldest. in_order: as pushed; otherwise each as soon as its transform can be had.
     on_dropped(message, error): called by the thread that asks for messages, once for each that is dropped: its age
     (the error says what was missing), the number ('too_much'), or data that is no longer kept.
 

@@ -12,9 +12,9 @@
 
 namespace tfdude {
 
-/// Many lookups at one common instant. Each owner is asked once for all segments that it owns. If it
-/// has an error, it is asked for fewer at a time, until the error is that of a single segment, and
-/// so of the pairs whose path it is on. Such pairs do not count for the common instant.
+/// Many lookups at one common instant. Each owner is asked once for all segments that it owns. If
+/// it has an error, it is asked for fewer at a time, until the error is that of a single segment,
+/// and so of the pairs whose path it is on. Such pairs do not count for the common instant.
 class LookupManyTask final : public Task {
  public:
   using Found = Result<StampedTransform>;

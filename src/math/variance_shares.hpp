@@ -10,8 +10,8 @@
 
 namespace tfdude {
 
-/// One number that depends on the error of a path, to first order: how far B's origin is off along a
-/// direction, or how far B is turned about one.
+/// One number that depends on the error of a path, to first order: how far B's origin is off along
+/// a direction, or how far B is turned about one.
 struct PathFunctional {
   Eigen::Vector3d direction;  ///< a unit vector: along the axes of A, or about the axes of B
   bool is_rotation = false;

@@ -152,8 +152,8 @@ class Recording::Impl {
     }
   }
 
-  // Each instant is looked up in the state that lookup_at() would find its answer in, or in one that
-  // differs only by messages that append samples.
+  // Each instant is looked up in the state that lookup_at() would find its answer in, or in one
+  // that differs only by messages that append samples.
   Trajectory trajectory(std::string_view a, std::string_view b, const std::vector<Time>& instants,
                         Query query, Milliseconds wait) {
     constexpr std::size_t kAtOnce = 256;
@@ -203,7 +203,7 @@ class Recording::Impl {
       const bool appended = appends.only_appends(*state_, *message);
       now_ = std::max(now_, message->log);
       if (!appended || since >= kAtOnce) {
-        // Who asks at the time of the message has it.
+        // A question at the time of the message comes after it.
         answer(message->log);
         since = 0;
       }

@@ -164,7 +164,7 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     const auto* histories = std::get_if<std::vector<HistoryInfo>>(&replies[i].body);
     if (histories == nullptr || histories->empty()) continue;
     const HistoryInfo& history = histories->front();
-    // A static edge is listed if it has refused samples.
+    // A static edge is listed if it has rejected samples.
     if (!history.newest && history.refused_ahead > 0) continue;
     owners.dynamic.push_back({edges[i].id, parts[i].partition, history.oldest, history.newest});
   }

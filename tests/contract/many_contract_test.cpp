@@ -136,7 +136,7 @@ TEST_CASE("many: a pair without an answer has its own error, and does not delay 
       CHECK(all[i].error().code == Errc::kTooOld);
       continue;
     }
-    // It does not count for the common instant.
+    // The stopped one does not count for the common instant.
     REQUIRE(all[i]);
     CHECK(all[i]->stamp == instant(kSamples - 1));
   }

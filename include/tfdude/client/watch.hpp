@@ -50,14 +50,14 @@ class TFDUDE_EXPORT PathWatch {
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
 
-  /// Waits for a value that this object has not returned yet: the first time for the newest one, and
-  /// then for the next one after that. Values that come between two calls are not queued; the newest
-  /// is returned. One thread at a time; each copy of this object has its own place.
+  /// Waits for a value that this object has not returned yet: the first time for the newest one,
+  /// and then for the next one after that. Values that come between two calls are not queued; the
+  /// newest is returned. One thread at a time; each copy of this object has its own place.
   /// @return as latest(); kTimeout: nothing new within `wait`
   [[nodiscard]] Result<StampedTransform> wait_next(Milliseconds wait);
 
-  /// Calls a function with the newest value, if there is one, and then when there is another one, or
-  /// with the reason when there is none any more. On a library thread that holds no lock: it may
+  /// Calls a function with the newest value, if there is one, and then when there is another one,
+  /// or with the reason when there is none any more. On a library thread that holds no lock: it may
   /// call any function and take any time; meanwhile values are not queued, and the newest comes
   /// next. Must not throw. Ends with the Subscription, the last PathWatch of the path, or the
   /// client.
