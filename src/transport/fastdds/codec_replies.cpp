@@ -199,7 +199,7 @@ constexpr auto kBody =
           TFDUDE_CASE(13, DescriptionPart, description, kDescription));
 
 constexpr auto kReply = record(
-    TFDUDE_FIELD(epoch, epoch, Count64()), TFDUDE_FIELD(lamport_time, lamport_time, Count64()),
+    TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),
     TFDUDE_FIELD(sequence_number, sequence, Count32()), TFDUDE_FIELD(body, body, kBody));
 
 }  // namespace
