@@ -3,8 +3,11 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <ctime>
 #include <memory>
+#include <string_view>
+#include <thread>
 #include <unistd.h>
 #include <utility>
 
@@ -16,6 +19,7 @@
 #include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
+#include "bounded_log.hpp"
 #include "exit_status.hpp"
 #include "service_manager.hpp"
 #include "stop_signals.hpp"
@@ -27,8 +31,8 @@ namespace tfdude::cli {
 /// nobody reads the log, lines are lost rather than delaying the program. The journal gets
 /// the level instead of the time and the name, which it knows.
 inline void log_to_standard_error() {
-  spdlog::set_default_logger(
-      spdlog::create_async_nb<spdlog::sinks::stderr_color_sink_mt>("tfdude"));
+  spdlog::set_default_logger(spdlog::create_async_nb<BoundedSink>(
+      "tfdude", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
   if (is_journal(STDERR_FILENO)) {
     auto formatter = std::make_unique<spdlog::pattern_formatter>();
     formatter->add_flag<JournalLevel>('*').set_pattern("<%*>%v");
@@ -36,6 +40,21 @@ inline void log_to_standard_error() {
   }
   log_fastdds_to_standard_error();
 }
+
+/// From now on the process ends within this time, whatever hangs: a thread of a library, or the
+/// disk. Changes that were acknowledged have been stored.
+inline void end_in(std::chrono::seconds time) {
+  std::thread([time] {
+    std::this_thread::sleep_for(time);
+    constexpr std::string_view kLine =
+        "a thread did not stop in time: the process ends without it\n";
+    (void)!write(STDERR_FILENO, kLine.data(), kLine.size());
+    std::_Exit(kRejected);
+  }).detach();
+}
+
+/// Less than service managers wait, and more than a slow disk needs.
+constexpr std::chrono::seconds kStopTime{8};
 
 /// Waits for a signal. Meanwhile feeds the watchdog of the service manager three times in its
 /// interval, as long as the node responds.
@@ -66,6 +85,7 @@ inline void log_to_standard_error() {
   notify("READY=1\nSTATUS=serving partition " + quote(node.partition()));
   const int signal = wait_for_signal(node, stop_signals);
   notify("STOPPING=1");
+  end_in(kStopTime);
   if (given_up) return kRejected;
   spdlog::info("stopping on signal {}", signal);
   return 0;

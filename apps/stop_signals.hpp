@@ -21,4 +21,18 @@ inline sigset_t block_stop_signals() {
   return signals;
 }
 
+/// While it exists, these signals end the process at once: there is nothing to stop in order while
+/// files are read, and a file may be slow, or a pipe that nobody writes to. Start no thread
+/// meanwhile.
+class EndAtSignals {
+ public:
+  EndAtSignals() : signals_(stop_signals()) { pthread_sigmask(SIG_UNBLOCK, &signals_, nullptr); }
+  ~EndAtSignals() { pthread_sigmask(SIG_BLOCK, &signals_, nullptr); }
+  EndAtSignals(const EndAtSignals&) = delete;
+  EndAtSignals& operator=(const EndAtSignals&) = delete;
+
+ private:
+  sigset_t signals_;
+};
+
 }  // namespace tfdude::cli

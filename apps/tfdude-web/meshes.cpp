@@ -4,6 +4,7 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <system_error>
@@ -24,6 +25,7 @@ using tinyxml2::XMLElement;
 
 constexpr std::size_t kMostVisuals = 2000;
 constexpr std::uintmax_t kMostBytes = std::uintmax_t{64} << 20U;  // of a mesh
+constexpr std::uintmax_t kMostBytesOfAll = std::uintmax_t{512} << 20U;
 
 std::string attribute(const XMLElement* element, const char* name) {
   const char* text = element == nullptr ? nullptr : element->Attribute(name);
@@ -110,9 +112,37 @@ class Finder {
   std::vector<fs::path> folders_;
 };
 
+// The meshes that are served: each file once, however many visuals show it.
+class Meshes {
+ public:
+  explicit Meshes(Files& files) : files_(files) {}
+
+  /// The path of a mesh; nothing if it cannot be served.
+  [[nodiscard]] std::optional<std::string> add(const fs::path& file) {
+    const auto known = paths_.find(file.string());
+    if (known != paths_.end()) return known->second;
+    const std::string ending = ending_of(file);
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    if (error || (ending != ".stl" && ending != ".dae") || bytes_ + size > kMostBytesOfAll) {
+      return std::nullopt;
+    }
+    const std::string path = "/mesh/" + std::to_string(paths_.size()) + ending;
+    if (!files_.add_file(file.string(), path)) return std::nullopt;
+    bytes_ += size;
+    paths_.emplace(file.string(), path);
+    return path;
+  }
+
+ private:
+  Files& files_;
+  std::map<std::string, std::string> paths_;
+  std::uintmax_t bytes_ = 0;
+};
+
 // The shape of a visual; nothing if it cannot be shown.
-std::optional<json> shape_of(const XMLElement* geometry, const Finder& finder, Files& files,
-                             std::size_t number, std::vector<std::string>& left_out) {
+std::optional<json> shape_of(const XMLElement* geometry, const Finder& finder, Meshes& meshes,
+                             std::vector<std::string>& left_out) {
   if (geometry == nullptr) return std::nullopt;
   if (const auto* box = geometry->FirstChildElement("box")) {
     return json{{"box", numbers(box, "size", 1)}};
@@ -127,13 +157,13 @@ std::optional<json> shape_of(const XMLElement* geometry, const Finder& finder, F
   const auto* mesh = geometry->FirstChildElement("mesh");
   const std::string name = attribute(mesh, "filename");
   const auto file = finder.find(name);
-  const std::string ending = file ? ending_of(*file) : std::string();
-  const std::string path = "/mesh/" + std::to_string(number) + ending;
-  if ((ending != ".stl" && ending != ".dae") || !files.add_file(file->string(), path)) {
-    left_out.push_back("mesh '" + name + "': no STL or Collada file below the folders");
+  const auto path = file ? meshes.add(*file) : std::nullopt;
+  if (!path) {
+    left_out.push_back("mesh '" + name +
+                       "': no STL or Collada file below the folders, or too large");
     return std::nullopt;
   }
-  return json{{"mesh", path}, {"scale", numbers(mesh, "scale", 1)}};
+  return json{{"mesh", *path}, {"scale", numbers(mesh, "scale", 1)}};
 }
 
 }  // namespace
@@ -148,13 +178,13 @@ Result<std::vector<std::string>> add_meshes(const std::string& urdf,
     const XMLElement* robot = document.FirstChildElement("robot");
     if (robot == nullptr) return fail(Errc::kConfig, urdf + " is no URDF that can be read");
     const Finder finder(urdf, folders);
+    Meshes meshes(files);
     for (auto* link = robot->FirstChildElement("link"); link != nullptr;
          link = link->NextSiblingElement("link")) {
       for (auto* visual = link->FirstChildElement("visual");
            visual != nullptr && visuals.size() < kMostVisuals;
            visual = visual->NextSiblingElement("visual")) {
-        auto shape = shape_of(visual->FirstChildElement("geometry"), finder, files, visuals.size(),
-                              left_out);
+        auto shape = shape_of(visual->FirstChildElement("geometry"), finder, meshes, left_out);
         if (!shape) continue;
         const XMLElement* origin = visual->FirstChildElement("origin");
         (*shape)["link"] = attribute(link, "name");

@@ -1,5 +1,6 @@
 #include "page_talk.hpp"
 
+#include <chrono>
 #include <utility>
 
 #include "tfdude/types/version.hpp"
@@ -14,6 +15,9 @@ namespace {
 constexpr std::size_t kBehind = std::size_t{256} << 10U;  // [B]
 // Covariances change slowly and are large: every so many pictures.
 constexpr int kCovarianceEvery = 15;
+// A page may change its pair so often; of wishes in between, the last one counts. Each pair is
+// watched at its owners.
+constexpr std::chrono::milliseconds kPairEvery{200};
 
 class PageTalk final : public Talk {
  public:
@@ -35,13 +39,11 @@ class PageTalk final : public Talk {
     const auto request = binary ? std::nullopt : parse_request(message);
     if (!request) return false;
     if (const auto* pair = std::get_if<PairRequest>(&*request)) {
-      pair_ = pair->a.empty() ? nullptr : live_.pairs().follow(pair->a, pair->b);
-      pair_number_ = 0;
-      if (past_) ask();
+      wish_ = *pair;
+      take_wish();
     } else if (const auto* past = std::get_if<PastRequest>(&*request)) {
       past_ = past->at;
-      past_due_ = true;
-      if (link_->waiting() <= kBehind) send_past();
+      past_due_ = true;  // with the next picture, however many of these come until then
       ask();
     } else {
       past_.reset();
@@ -54,6 +56,7 @@ class PageTalk final : public Talk {
   }
 
   void tick() override {
+    take_wish();
     if (link_->waiting() > kBehind) return;
     send_structure();
     send_events();
@@ -74,6 +77,16 @@ class PageTalk final : public Talk {
   }
 
  private:
+  void take_wish() {
+    const auto now = std::chrono::steady_clock::now();
+    if (!wish_ || now < next_pair_) return;
+    next_pair_ = now + kPairEvery;
+    const PairRequest wish = *std::exchange(wish_, {});
+    pair_ = wish.a.empty() ? nullptr : live_.pairs().follow(wish.a, wish.b);
+    pair_number_ = 0;
+    if (past_) ask();
+  }
+
   void send(const Text& text) {
     if (text) link_->send(text, false);
   }
@@ -147,6 +160,8 @@ class PageTalk final : public Talk {
   std::uint64_t events_ = 0;
   std::uint64_t status_ = 0;
   std::uint64_t joints_ = 0;
+  std::optional<PairRequest> wish_;
+  std::chrono::steady_clock::time_point next_pair_;  // when it may change
   std::shared_ptr<Pair> pair_;
   std::uint64_t pair_number_ = 0;
   std::optional<Time> past_;

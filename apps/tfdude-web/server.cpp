@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <list>
 #include <optional>
 #include <set>
 #include <thread>
@@ -28,11 +29,15 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kMostConnections = 64;
+constexpr std::size_t kMostConnections = 64;  // of WebSocket
+// Those that have not shown that they may enter have places of their own, and little time.
+constexpr std::size_t kMostVisits = 64;
+constexpr std::chrono::seconds kStrangersTime{1};
 constexpr std::size_t kMostMessage = std::size_t{64} << 10U;  // of a client [B]
 constexpr std::uint32_t kMostHead = 8192;                     // of a request [B]
-// Control messages wait for a client that does not read until this many bytes do.
+// Control messages wait for clients that do not read, until this many bytes do, of one and of all.
 constexpr std::size_t kMostWaiting = std::size_t{64} << 20U;
+constexpr std::size_t kMostWaitingOfAll = std::size_t{256} << 20U;
 constexpr std::chrono::seconds kRequestTime{30};
 
 using Head = http::request<http::empty_body>;
@@ -50,8 +55,11 @@ Request request_of(const Head& head) {
           text(head[http::field::sec_websocket_protocol])};
 }
 
-http::response<http::string_body> response_of(const Reply& reply, const Head& head) {
-  http::response<http::string_body> response(http::int_to_status(reply.status), head.version());
+// The body is not copied: who asks for a large one and does not read it costs nothing.
+using Response = http::response<http::span_body<const char>>;
+
+Response response_of(const Reply& reply, const Head& head) {
+  Response response(http::int_to_status(reply.status), head.version());
   response.set(http::field::content_type, reply.type);
   response.set(http::field::cache_control, "no-cache");
   response.set("Referrer-Policy", "no-referrer");
@@ -62,18 +70,21 @@ http::response<http::string_body> response_of(const Reply& reply, const Head& he
   if (!reply.set_cookie.empty()) response.set(http::field::set_cookie, reply.set_cookie);
   if (!reply.location.empty()) response.set(http::field::location, reply.location);
   response.keep_alive(head.keep_alive());
-  if (reply.body) response.body() = *reply.body;
+  if (reply.body) response.body() = {reply.body->data(), reply.body->size()};
   response.prepare_payload();
   return response;
 }
 
 class Connection;
+class Visit;
 
 // All that lives as long as the server, on its thread.
 struct Shared {
   Site site;
   std::set<std::shared_ptr<Connection>> talking;
-  std::size_t open = 0;
+  std::size_t open = 0;           // connections
+  std::list<Visit*> visits;       // the oldest first
+  std::size_t waiting_bytes = 0;  // of all connections
 };
 
 // A WebSocket connection.
@@ -83,7 +94,10 @@ class Connection final : public Link, public std::enable_shared_from_this<Connec
       : stream_(std::move(socket)), shared_(shared), accepted_(std::move(accepted)) {
     ++shared_.open;
   }
-  ~Connection() override { --shared_.open; }
+  ~Connection() override {
+    --shared_.open;
+    shared_.waiting_bytes -= waiting_;
+  }
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
@@ -107,8 +121,10 @@ class Connection final : public Link, public std::enable_shared_from_this<Connec
   void send(std::shared_ptr<const std::string> message, bool binary) override {
     if (closed_) return;
     waiting_ += message->size();
+    shared_.waiting_bytes += message->size();
     queue_.emplace_back(std::move(message), binary);
-    if (waiting_ > kMostWaiting) {
+    const bool too_much = shared_.waiting_bytes > kMostWaitingOfAll && waiting_ > kMostWaiting / 64;
+    if (waiting_ > kMostWaiting || too_much) {
       end();
     } else if (queue_.size() == 1) {
       write();
@@ -150,6 +166,7 @@ class Connection final : public Link, public std::enable_shared_from_this<Connec
                         [self = shared_from_this()](error_code error, std::size_t) {
                           if (error) return self->end();
                           self->waiting_ -= self->queue_.front().first->size();
+                          self->shared_.waiting_bytes -= self->queue_.front().first->size();
                           self->queue_.pop_front();
                           if (!self->queue_.empty()) self->write();
                         });
@@ -167,18 +184,27 @@ class Connection final : public Link, public std::enable_shared_from_this<Connec
 // A connection before, or without, the upgrade to WebSocket.
 class Visit : public std::enable_shared_from_this<Visit> {
  public:
-  Visit(tcp::socket&& socket, Shared& shared) : stream_(std::move(socket)), shared_(shared) {
-    ++shared_.open;
-  }
-  ~Visit() { --shared_.open; }
+  Visit(tcp::socket&& socket, Shared& shared)
+      : stream_(std::move(socket)),
+        shared_(shared),
+        place_(shared.visits.insert(shared.visits.end(), this)) {}
+  ~Visit() { shared_.visits.erase(place_); }
   Visit(const Visit&) = delete;
   Visit& operator=(const Visit&) = delete;
+
+  /// Whether it has only been waited for so far, so that it may make room.
+  [[nodiscard]] bool is_stranger() const { return !known_; }
+
+  void close() {
+    error_code ignored;
+    stream_.socket().close(ignored);
+  }
 
   void read() {
     parser_.emplace();
     parser_->header_limit(kMostHead);
     parser_->body_limit(0);
-    stream_.expires_after(kRequestTime);
+    stream_.expires_after(known_ ? kRequestTime : kStrangersTime);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, std::size_t) {
                        if (!error) self->answer();
@@ -192,6 +218,10 @@ class Visit : public std::enable_shared_from_this<Visit> {
     if (websocket::is_upgrade(head)) {
       auto accepted = shared_.site.accept(request);
       if (!accepted) return write(accepted.error());
+      if (shared_.open >= kMostConnections) {
+        return write({503, "text/plain",
+                      std::make_shared<const std::string>("there are too many connections\n")});
+      }
       stream_.expires_never();
       std::make_shared<Connection>(stream_.release_socket(), shared_, std::move(*accepted))
           ->run(head);
@@ -204,7 +234,11 @@ class Visit : public std::enable_shared_from_this<Visit> {
   }
 
   void write(const Reply& reply) {
+    constexpr unsigned kFirstError = 400;
+    known_ = reply.status < kFirstError;
+    body_ = reply.body;
     response_ = response_of(reply, parser_->get());
+    stream_.expires_after(kRequestTime);
     http::async_write(stream_, *response_,
                       [self = shared_from_this()](error_code error, std::size_t) {
                         if (error) return;
@@ -220,7 +254,10 @@ class Visit : public std::enable_shared_from_this<Visit> {
   Shared& shared_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
-  std::optional<http::response<http::string_body>> response_;
+  const std::list<Visit*>::iterator place_;
+  bool known_ = false;  // its last request was answered with what it asked for
+  std::shared_ptr<const std::string> body_;
+  std::optional<Response> response_;
 };
 
 class BeastServer final : public Server {
@@ -269,12 +306,23 @@ class BeastServer final : public Server {
   void accept() {
     acceptor_.async_accept([this](error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && shared_.open < kMostConnections) {
+      if (!error && make_room()) {
         socket.set_option(tcp::no_delay(true), error);
         std::make_shared<Visit>(std::move(socket), shared_)->read();
       }
       accept();
     });
+  }
+
+  // The stranger that has waited for longest goes first.
+  bool make_room() {
+    if (shared_.visits.size() < kMostVisits) return true;
+    const auto stranger = std::find_if(shared_.visits.begin(), shared_.visits.end(),
+                                       [](const Visit* visit) { return visit->is_stranger(); });
+    if (stranger == shared_.visits.end()) return false;
+    (*stranger)->close();  // its handler runs later, and deletes it
+    shared_.visits.splice(shared_.visits.end(), shared_.visits, stranger);
+    return shared_.visits.size() < 2 * kMostVisits;
   }
 
   void wait() {

@@ -143,6 +143,9 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
                                "(default: $XDG_STATE_HOME/tfdude or ~/.local/state/tfdude)");
   app.add_flag("--no-state", no_state, "store nothing: start from --config each time")
       ->excludes(state);
+  app.add_flag(
+      "--drop-damaged", arguments.drop_damaged,
+      "leave out the frames and values of the stored state that are damaged, and name them");
   app.add_flag("--sync", arguments.options.sync,
                "acknowledged changes survive a power failure: each waits for the disk");
   app.add_option("--save-every", save_every_ms,

@@ -18,6 +18,7 @@ struct Arguments {
   /// Of their edges that have none, instead of that of the configuration.
   std::optional<StatedCovariance> covariance;
   bool check = false;  ///< only print what the configuration would change
+  bool drop_damaged = false;  ///< leave out stored rows whose checksum is wrong
   std::optional<ClockKind> clock;
   Options options;
 };

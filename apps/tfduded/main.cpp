@@ -13,6 +13,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
+#include "tfdude/client/state_repair.hpp"
 #include "tfdude/description/config.hpp"
 
 #include "../process.hpp"
@@ -81,12 +82,23 @@ int check_all(Arguments arguments) {
 
 int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   if (!arguments.further.empty()) return check_all(arguments);
-  const auto config = configure(arguments);
+  const auto config = [&] {
+    const tfdude::cli::EndAtSignals may_end;
+    return configure(arguments);
+  }();
   if (!config) {
     spdlog::error("{}", config.error().message);
     return kWrongUsage;
   }
   if (arguments.check) return tfdude::daemon::check(arguments, *config);
+  if (arguments.drop_damaged) {
+    const auto dropped = tfdude::drop_damaged_state(config->partition, arguments.options);
+    if (!dropped) {
+      spdlog::error("{}", dropped.error().message);
+      return kWrongUsage;
+    }
+    for (const std::string& row : *dropped) spdlog::warn("left out of the stored state: {}", row);
+  }
   tfdude::Options options = arguments.options;
   options.history = config->history;
   options.clock = config->clock.value_or(tfdude::ClockKind::kSystem);

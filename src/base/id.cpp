@@ -91,9 +91,10 @@ Result<void> check_id(std::string_view id, std::string_view what) {
 
 Result<void> check_new_id(std::string_view id, std::string_view what) {
   if (auto ok = check_id(id, what); !ok) return ok;
-  const std::string_view where = id.front() == ' '  ? " begins with a space"
-                                 : id.back() == ' ' ? " ends with a space"
-                                                    : "";
+  const std::string_view where = id.front() == ' '   ? " begins with a space"
+                                 : id.front() == '-' ? " begins with '-', like an option"
+                                 : id.back() == ' '  ? " ends with a space"
+                                                     : "";
   if (where.empty() && is_plain(id)) return {};
   const std::string who = std::string(what) + " " + quote(id);
   if (!where.empty()) return fail(Errc::kInvalidInput, who + std::string(where));

@@ -53,7 +53,7 @@ Result<void> Node::release(const std::vector<std::string>& ids) {
   return participant_->member().release(ids, participant_->discovery().call_deadline());
 }
 
-bool Node::responds(Milliseconds wait) { return participant_->member().responds(Deadline(wait)); }
+bool Node::responds(Milliseconds wait) { return participant_->responds(wait); }
 
 Subscription Node::on_taken(std::function<void(const Change&)> listener) {
   return Subscription(participant_->member().on_taken(std::move(listener)));

@@ -1,5 +1,7 @@
 #include "tfdude/keys/key_files.hpp"
 
+#include <unistd.h>
+
 #include <openssl/x509.h>
 
 #include "tfdude/keys/key_store.hpp"
@@ -113,6 +115,17 @@ Result<void> read_documents(KeyFiles& files, const Certificates& certificates) {
   return {};
 }
 
+// A user who can replace one of the files can make this program trust another authority. A file
+// that is missing is named when it is read, and the key has a check of its own.
+Result<void> check_all_unchangeable(const std::string& directory, const KeyFiles& files) {
+  for (const std::string& path : {directory, files.certificate, files.authority, files.revoked,
+                                  files.governance, files.permissions}) {
+    if (access(path.c_str(), F_OK) != 0) continue;
+    if (auto ok = keys::check_unchangeable(path); !ok) return ok;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<KeyFiles> find_keys(const std::string& directory, Time now) {
@@ -120,6 +133,7 @@ Result<KeyFiles> find_keys(const std::string& directory, Time now) {
     return wrong(directory, "is a key store; give the directory of one identity in it");
   }
   KeyFiles files = keys::files_in(directory);
+  if (auto ok = check_all_unchangeable(directory, files); !ok) return tl::unexpected(ok.error());
   const auto certificates = read_certificates(files, now);
   if (!certificates) return tl::unexpected(certificates.error());
   if (auto ok = check_key(files, certificates->own); !ok) return tl::unexpected(ok.error());

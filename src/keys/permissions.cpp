@@ -49,7 +49,7 @@ constexpr std::array<Access, 18> kTable{{
     {kChangeTopic, kPublish, Right::kChange},
     {kChangeTopic, kSubscribe, Right::kServe},
     {kReplyTopic, kPublish, Right::kServe, "/*"},  // P/RECEIVER
-    {kReplyTopic, kSubscribe, Right::kAll},        // */RECEIVER
+    {kReplyTopic, kSubscribe, Right::kLook},       // */RECEIVER
     {kStateTopic, kPublish, Right::kServe, "/*"},  // P/GROUP
     {kStateTopic, kSubscribe, Right::kLook},
     {kUpdateTopic, kPublish, Right::kStream},

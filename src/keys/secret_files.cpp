@@ -33,6 +33,15 @@ bool write_all(int descriptor, std::string_view content) {
   return true;
 }
 
+// The owner can change the mode. Root can do everything.
+Result<void> check_owner(const std::string& path, const struct stat& found) {
+  constexpr uid_t kRoot = 0;
+  if (found.st_uid == geteuid() || found.st_uid == kRoot) return {};
+  return fail(Errc::kConfig, printable(path) + ": belongs to user " + std::to_string(found.st_uid) +
+                                 ", who could change it: chown it to " + "user " +
+                                 std::to_string(geteuid()));
+}
+
 // What was renamed is on the disk only when its directory is.
 void sync_parent(const std::string& path) {
   const std::string parent = std::filesystem::path(path).parent_path();
@@ -84,9 +93,19 @@ Result<void> remove_directory(const std::string& path) {
   return {};
 }
 
+Result<void> check_unchangeable(const std::string& path) {
+  struct stat found {};
+  if (stat(path.c_str(), &found) != 0) return failed(path, "read");
+  if (auto ok = check_owner(path, found); !ok) return ok;
+  if ((found.st_mode & (S_IWGRP | S_IWOTH)) == 0) return {};
+  return fail(Errc::kConfig,
+              printable(path) + ": others than its owner can change it: chmod go-w it");
+}
+
 Result<void> check_secret(const std::string& path) {
   struct stat found {};
   if (stat(path.c_str(), &found) != 0) return failed(path, "read");
+  if (auto ok = check_owner(path, found); !ok) return ok;
   if ((found.st_mode & (S_IRWXG | S_IRWXO)) == 0) return {};
   char mode[8] = {};
   std::snprintf(mode, sizeof mode, "%04o", found.st_mode & 07777U);

@@ -19,6 +19,10 @@ namespace tfdude::keys {
 
 [[nodiscard]] Result<void> remove_directory(const std::string& path);
 
+/// Fails if others than this user, and root, can change or replace the file or directory: it
+/// belongs to another user, or its group or everybody may write to it.
+[[nodiscard]] Result<void> check_unchangeable(const std::string& path);
+
 /// Fails if others than the owner can read or write the file.
 [[nodiscard]] Result<void> check_secret(const std::string& path);
 

@@ -71,17 +71,28 @@ class Collection {
     }
   }
 
+  /// Looks at each frame once, however many trees overlap.
   void add_tree(const std::string& tree) {
-    if (tree.back() != kAnyName) {
-      for (const FrameInfo& frame : forest_.subtree(tree)) add(frame.id);
-      return;
-    }
-    const std::string_view prefix(tree.data(), tree.size() - 1);
-    for (const FrameInfo& frame : forest_.frames()) {
-      if (frame.id.compare(0, prefix.size(), prefix) == 0) add(frame.id);
+    if (whole_.count(tree) != 0) return;
+    for (const FrameInfo& frame : forest_.subtree(tree)) {
+      if (is_full()) return;
+      whole_.insert(frame.id);
+      add(frame.id);
     }
   }
 
+  void add_named(const std::vector<std::string_view>& prefixes) {
+    const auto begins = [](const std::string& id) {
+      return [&id](std::string_view prefix) { return id.compare(0, prefix.size(), prefix) == 0; };
+    };
+    for (const FrameInfo& frame : forest_.frames()) {
+      if (is_full()) return;
+      if (std::any_of(prefixes.begin(), prefixes.end(), begins(frame.id))) add(frame.id);
+    }
+  }
+
+  /// More do not fit an answer.
+  [[nodiscard]] bool is_full() const { return known_.size() > kMaxItems; }
   [[nodiscard]] std::vector<KnownFrame>& known() { return known_; }
 
  private:
@@ -89,7 +100,34 @@ class Collection {
   const Directory& directory_;
   std::vector<KnownFrame> known_;
   std::unordered_set<std::string> taken_;
+  std::unordered_set<std::string> whole_;  // with all below them
 };
+
+// Each of them is compared with all frames.
+constexpr std::size_t kMaxPatterns = 64;
+
+// Stops as soon as there are too many.
+Result<void> collect(const FramesRequest& request, Collection& found) {
+  std::vector<std::string_view> prefixes;
+  for (const std::string& tree : request.trees) {
+    if (tree.back() == kAnyName) prefixes.emplace_back(tree.data(), tree.size() - 1);
+  }
+  if (prefixes.size() > kMaxPatterns) {
+    return fail(Errc::kTooMuch, std::to_string(prefixes.size()) +
+                                    " patterns of names, of at most " +
+                                    std::to_string(kMaxPatterns));
+  }
+  for (const std::string& id : request.ids) {
+    if (!found.is_full()) found.add(id);
+  }
+  for (const std::string& tree : request.trees) {
+    if (tree.back() != kAnyName && !found.is_full()) found.add_tree(tree);
+  }
+  if (!prefixes.empty()) found.add_named(prefixes);
+  if (!found.is_full()) return {};
+  return fail(Errc::kTooMuch, "the requested trees have more than " + std::to_string(kMaxItems) +
+                                  " frames, with those above them");
+}
 
 }  // namespace
 
@@ -105,13 +143,7 @@ Result<std::vector<KnownFrame>> known_frames(const Forest& forest, const Directo
                                    quote(directory.name(kHeldHere)) + " yet");
   }
   Collection found(forest, directory);
-  for (const std::string& id : request.ids) found.add(id);
-  for (const std::string& tree : request.trees) found.add_tree(tree);
-  if (const std::size_t count = found.known().size(); count > kMaxItems) {
-    return fail(Errc::kTooMuch, "the requested trees have " + std::to_string(count) +
-                                    " frames, with those above them, of at most " +
-                                    std::to_string(kMaxItems));
-  }
+  if (auto ok = collect(request, found); !ok) return tl::unexpected(std::move(ok.error()));
   return std::move(found.known());
 }
 

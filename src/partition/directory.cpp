@@ -4,14 +4,9 @@
 #include <iterator>
 #include <utility>
 
+#include "partition/counters.hpp"
+
 namespace tfdude {
-namespace {
-
-// No clock reaches this value, and one more can always be added.
-constexpr std::uint64_t kLastLamportTime = 1ULL << 63U;
-
-}  // namespace
-
 Directory::Directory(Forest& forest, std::string own)
     : forest_(forest), claims_(forest, changes_), partitions_(1) {
   if (!own.empty()) owners_.emplace(own, kHeldHere);
@@ -228,13 +223,13 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
 }
 
 void Directory::saw_lamport_time(std::uint64_t time) {
-  latest_lamport_time_ = std::max(latest_lamport_time_, std::min(time, kLastLamportTime));
+  latest_lamport_time_ = std::max(latest_lamport_time_, std::min(time, kLastCounter));
 }
 
 std::uint64_t Directory::next_lamport_time(Time now) {
   const auto nanoseconds = now.time_since_epoch().count();
   const auto clock = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;
-  latest_lamport_time_ = std::max(clock, latest_lamport_time_ + 1);
+  latest_lamport_time_ = std::max(clock, next_counter(latest_lamport_time_));
   return latest_lamport_time_;
 }
 

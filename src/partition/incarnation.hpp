@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "tfdude/base/time.hpp"
+
+#include "partition/counters.hpp"
 
 namespace tfdude {
 
@@ -13,7 +16,7 @@ namespace tfdude {
 class IncarnationSource {
  public:
   /// Numbers from here on are invalid; received ones may be wrong.
-  static constexpr std::uint64_t kEnd = 1ULL << 63U;
+  static constexpr std::uint64_t kEnd = kLastIncarnation + 1;
 
   /// Number of random low bits; the others count milliseconds, approximately.
   static constexpr unsigned kRandomBits = 20;
@@ -23,13 +26,15 @@ class IncarnationSource {
     if (incarnation < kEnd && incarnation > latest_) latest_ = incarnation;
   }
 
+  /// At the end of the range, only the random bits are new.
   /// @param random  any number, different for each process
   [[nodiscard]] std::uint64_t next(Time clock, std::uint64_t random) const {
     const auto nanoseconds = clock.time_since_epoch().count();
     const std::uint64_t time = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;
     const std::uint64_t past = time > latest_ ? time : latest_;
     constexpr std::uint64_t kStep = 1ULL << kRandomBits;
-    return (past / kStep + 1) * kStep + random % kStep;
+    const std::uint64_t next = std::min(past / kStep + 1, kLastIncarnation / kStep - 1);
+    return next * kStep + random % kStep;
   }
 
  private:

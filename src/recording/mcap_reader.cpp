@@ -38,7 +38,24 @@ Result<McapReader> McapReader::open(std::unique_ptr<ByteSource> source) {
   }
   std::stable_sort(reader.chunks_.begin(), reader.chunks_.end(),
                    [](const ChunkPlace& a, const ChunkPlace& b) { return a.offset < b.offset; });
+  reader.drop_overlapping();
   return reader;
+}
+
+// Chunks of a file lie one after the other. An index that names one several times would have it
+// read as often.
+void McapReader::drop_overlapping() {
+  std::uint64_t end = 0;
+  const auto overlaps = [&end](const ChunkPlace& chunk) {
+    if (chunk.offset < end) return true;
+    end = chunk.offset + std::min(chunk.length, UINT64_MAX - chunk.offset);
+    return false;
+  };
+  const auto kept = std::remove_if(chunks_.begin(), chunks_.end(), overlaps);
+  if (kept == chunks_.end()) return;
+  problems_.push_back(std::to_string(chunks_.end() - kept) +
+                      " chunks are named more than once, or lie in another one");
+  chunks_.erase(kept, chunks_.end());
 }
 
 const Schema* McapReader::schema(std::uint16_t id) const {

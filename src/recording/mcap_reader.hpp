@@ -33,7 +33,7 @@ struct ChunkPlace {
 class McapReader {
  public:
   static constexpr std::size_t kMaxChunks = std::size_t{1} << 22U;
-  static constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 28U;
+  static constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 26U;
   /// Of other records, such as schemas; and of all schemas and metadata together.
   static constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 24U;
   static constexpr std::uint64_t kMaxNamesBytes = std::uint64_t{1} << 26U;
@@ -81,6 +81,7 @@ class McapReader {
   [[nodiscard]] Result<void> add_scanned_chunk(const Record& record);
   [[nodiscard]] Result<void> add_loose_message(const Record& record);
   [[nodiscard]] Result<void> add_chunk(ChunkPlace chunk);
+  void drop_overlapping();
   [[nodiscard]] Result<std::optional<Record>> record_at(std::uint64_t offset, std::uint64_t end);
   [[nodiscard]] Result<std::string_view> body(const Record& record);
   [[nodiscard]] Result<void> count_names(std::uint64_t bytes);

@@ -65,7 +65,7 @@ Result<Streams*> Participant::streams() {
 }
 
 Reply Participant::answer_own(const Request& request) {
-  auto reply = answer_query(request);
+  auto reply = answer_query(request, std::nullopt);
   return reply ? *std::move(reply) : member_.answer(request);
 }
 
@@ -118,14 +118,17 @@ Result<void> Participant::publish_clock(Time now) {
   return transport_->publish_clock(now);
 }
 
-std::optional<Reply> Participant::answer_query(const Request& request) {
+std::optional<Reply> Participant::answer_query(const Request& request,
+                                               const std::optional<PeerId>& from) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return member_.partition()->answer_lookup(request.sequence, *lookup);
   }
   if (std::holds_alternative<HistoryRequest>(request.body)) {
     return member_.partition()->answer_history(request);
   }
-  if (std::holds_alternative<WatchRequest>(request.body)) return watch_server_.answer(request);
+  if (std::holds_alternative<WatchRequest>(request.body)) {
+    return watch_server_.answer(request, from);
+  }
   if (std::holds_alternative<FramesRequest>(request.body)) return answer_frames(request);
   if (std::holds_alternative<DescriptionRequest>(request.body))
     return descriptions_.answer(request);
@@ -154,11 +157,16 @@ Reply Participant::answer_frames(const Request& request) {
   return reply;
 }
 
+bool Participant::responds(Milliseconds wait) {
+  return transport_->busy_for() < wait && member().responds(Deadline(wait));
+}
+
 RefusedCounts Participant::refused() {
   RefusedCounts counts;
   counts.watches = watch_server_.refused();
   counts.dropped_samples = structure_.forest.dropped_samples();
   counts.messages = transport_->dropped();
+  counts.datagrams = transport_->refused_datagrams();
   const Lock lock(structure_.mutex);
   if (const Partition* own = member_.partition()) counts.frames = own->refused_frames();
   return counts;
@@ -166,7 +174,7 @@ RefusedCounts Participant::refused() {
 
 void Participant::on_request(const PeerId& from, const Request& request) {
   if (member_.partition() == nullptr) return;
-  auto reply = answer_query(request);
+  auto reply = answer_query(request, from);
   if (!reply) reply = member_.on_request(from, request);
   if (reply) transport_->reply(from, *reply);
 }

@@ -86,6 +86,8 @@ class Participant final : public TransportHandler,
 
   /// What limits have rejected.
   [[nodiscard]] RefusedCounts refused();
+  /// Of Node.
+  [[nodiscard]] bool responds(Milliseconds wait);
 
   // TransportHandler
   void on_request(const PeerId& from, const Request& request) override;
@@ -135,7 +137,8 @@ class Participant final : public TransportHandler,
   [[nodiscard]] std::optional<Requests::Follow> follow();
   [[nodiscard]] Reply answer_frames(const Request& request);
   /// The reply to a request that changes nothing; empty for other requests.
-  [[nodiscard]] std::optional<Reply> answer_query(const Request& request);
+  [[nodiscard]] std::optional<Reply> answer_query(const Request& request,
+                                                  const std::optional<PeerId>& from);
 
   const Options options_;
   ProcessMemory process_memory_;

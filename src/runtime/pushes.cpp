@@ -1,6 +1,8 @@
 #include "runtime/pushes.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <string>
 #include <utility>
 
 #include "base/mutex.hpp"
@@ -13,7 +15,44 @@ void Pushes::stop() {
   forest_.on_commit(nullptr);
 }
 
-Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& request) {
+Result<void> Pushes::check_room(const WatchRequest& request, const std::optional<PeerId>& watcher) {
+  if (groups_.size() >= max_groups_) {
+    return fail(Errc::kTooMuch, "there are " + std::to_string(groups_.size()) +
+                                    " groups of watchers with different paths, the limit");
+  }
+  if (edges_ + request.segments.size() > kMostEdges) {
+    return fail(Errc::kTooMuch, "the watched paths have " + std::to_string(edges_) +
+                                    " edges, of at most " + std::to_string(kMostEdges));
+  }
+  if (!watcher) return {};
+  const auto now = sink_.now();
+  forget_idle_watchers(now);
+  Watcher& one = watchers_[*watcher];
+  one.last = now;
+  const std::size_t share = std::max<std::size_t>(max_groups_ / 2, 1);
+  if (one.groups >= share && max_groups_ > 1) {
+    return fail(Errc::kTooMuch, "this participant watches " + std::to_string(one.groups) +
+                                    " different paths, its share of the limit");
+  }
+  if (one.begins.take(now)) return {};
+  return fail(Errc::kTooMuch, "this participant begins to watch more than " +
+                                  std::to_string(static_cast<int>(kNewPerSecond)) +
+                                  " different paths per second");
+}
+
+// Their tokens are all there again by then.
+void Pushes::forget_idle_watchers(Clock::time_point now) {
+  constexpr std::chrono::seconds kIdle{static_cast<int>(kNewAtOnce / kNewPerSecond) + 1};
+  constexpr std::size_t kFew = 64;
+  if (watchers_.size() < kFew) return;
+  for (auto one = watchers_.begin(); one != watchers_.end();) {
+    const bool idle = one->second.groups == 0 && now - one->second.last > kIdle;
+    one = idle ? watchers_.erase(one) : std::next(one);
+  }
+}
+
+Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& request,
+                                   const std::optional<PeerId>& watcher) {
   if (auto ok = check_watch(request); !ok) return tl::unexpected(ok.error());
   Result<PushedValues> snapshot;
   {
@@ -21,13 +60,14 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
     const bool first = groups_.empty();
     auto known = groups_.find(group);
     if (known == groups_.end()) {
-      if (groups_.size() >= max_groups_) {
+      if (auto room = check_room(request, watcher); !room) {
         ++refused_;
-        return fail(Errc::kTooMuch, "there are " + std::to_string(groups_.size()) +
-                                        " groups of watchers with different paths, the limit");
+        return tl::unexpected(std::move(room.error()));
       }
-      known =
-          groups_.emplace(group, Group{WatchedGroup(group, request), {}, sink_.now(), false}).first;
+      Group begun{WatchedGroup(group, request), {}, sink_.now(), false, watcher};
+      known = groups_.emplace(group, std::move(begun)).first;
+      edges_ += request.segments.size();
+      if (watcher) ++watchers_[*watcher].groups;
     }
     snapshot = known->second.watched.snapshot(forest_, request.from);
     if (!snapshot) {
@@ -54,6 +94,8 @@ void Pushes::tell_all(std::uint64_t group) {
 // The thread reports the end, as it may still be pushing to the group.
 void Pushes::end(std::map<std::uint64_t, Group>::iterator& group) {
   ended_.push_back(group->first);
+  edges_ -= group->second.watched.request().segments.size();
+  if (const auto& by = group->second.begun_by) --watchers_[*by].groups;
   group = groups_.erase(group);
 }
 

@@ -4,9 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "base/mutex.hpp"
+#include "base/token_bucket.hpp"
+#include "partition/messages.hpp"
 #include "partition/watching.hpp"
 #include "tree/forest.hpp"
 
@@ -34,6 +37,13 @@ class Pushes {
     [[nodiscard]] virtual Clock::time_point now() const { return Clock::now(); }
   };
 
+  /// New groups that one watcher may begin at once, and in each second after that: an owner makes a
+  /// DDS writer for each, which all participants discover. It may have half of all groups.
+  static constexpr double kNewAtOnce = 128;
+  static constexpr double kNewPerSecond = 20;
+  /// Edges of all groups together: each takes some 300 bytes.
+  static constexpr std::size_t kMostEdges = 262'144;
+
   /// @param max_groups  watch() rejects further ones with kTooMuch
   Pushes(Forest& forest, std::size_t max_groups, Sink& sink)
       : forest_(forest), max_groups_(max_groups), sink_(sink) {}
@@ -41,9 +51,11 @@ class Pushes {
   /// Values are no longer noticed. Later watch requests are still answered.
   void stop();
 
-  /// Starts to push to a group, or renews its lease. @return all current values; kNotOwner,
-  /// kInvalidInput, kTooMuch.
-  [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request);
+  /// Starts to push to a group, or renews its lease.
+  /// @param watcher  who asks; none: this process, which has no limit of its own
+  /// @return all current values; kNotOwner, kInvalidInput, kTooMuch.
+  [[nodiscard]] Result<PushedValues> watch(std::uint64_t group, const WatchRequest& request,
+                                           const std::optional<PeerId>& watcher = {});
 
   /// How many groups were rejected.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
@@ -61,7 +73,18 @@ class Pushes {
     Clock::time_point lease;
     Clock::time_point due;
     bool all = false;  // must be sent completely once more
+    std::optional<PeerId> begun_by{};
   };
+  struct Watcher {
+    TokenBucket begins{kNewPerSecond, kNewAtOnce};
+    std::size_t groups = 0;  // that it has begun
+    Clock::time_point last{};
+  };
+
+  [[nodiscard]] Result<void> check_room(const WatchRequest& request,
+                                        const std::optional<PeerId>& watcher)
+      TFDUDE_REQUIRES(mutex_);
+  void forget_idle_watchers(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
 
   void end(std::map<std::uint64_t, Group>::iterator& group) TFDUDE_REQUIRES(mutex_);
   /// The values to send now.
@@ -76,6 +99,8 @@ class Pushes {
   std::atomic<std::uint64_t> refused_{0};
   Mutex mutex_{LockRank::kParts};
   std::map<std::uint64_t, Group> groups_ TFDUDE_GUARDED_BY(mutex_);
+  std::map<PeerId, Watcher> watchers_ TFDUDE_GUARDED_BY(mutex_);
+  std::size_t edges_ TFDUDE_GUARDED_BY(mutex_) = 0;             // of all groups
   std::vector<std::uint64_t> ended_ TFDUDE_GUARDED_BY(mutex_);  // whose end is not reported yet
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
 };

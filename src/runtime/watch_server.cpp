@@ -20,12 +20,13 @@ void WatchServer::push(const PushedValues& values) {
   watches_.on_pushed(values);
 }
 
-Reply WatchServer::answer(const Request& request) {
+Reply WatchServer::answer(const Request& request, const std::optional<PeerId>& watcher) {
   const std::string who = "partition " + quote(context_.member.name());
   if (stopped_) return {request.sequence, 0, Error{Errc::kNotOwner, who + " is leaving"}};
   const auto& watch = std::get<WatchRequest>(request.body);
   const std::uint64_t incarnation = context_.member.incarnation();
-  auto pushed = pushes_.watch(watch_group(context_.member.name(), incarnation, watch), watch);
+  auto pushed =
+      pushes_.watch(watch_group(context_.member.name(), incarnation, watch), watch, watcher);
   if (!pushed) {
     if (pushed.error().code == Errc::kTooMuch) pushed = fail_at(who, pushed.error());
     return {request.sequence, 0, std::move(pushed.error())};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 
 #include "runtime/context.hpp"
 #include "runtime/pushes.hpp"
@@ -26,8 +27,8 @@ class WatchServer final : private Pushes::Sink {
   /// Ends pushing; later watch requests are rejected.
   void stop();
 
-  /// The reply to a WatchRequest.
-  [[nodiscard]] Reply answer(const Request& request);
+  /// The reply to a WatchRequest. @param watcher  who asks; none: this process
+  [[nodiscard]] Reply answer(const Request& request, const std::optional<PeerId>& watcher = {});
 
   /// How many groups of watchers were rejected.
   [[nodiscard]] std::uint64_t refused() const { return pushes_.refused(); }

@@ -2,21 +2,15 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/counters.hpp"
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
 #include "store/schema.hpp"
 
 namespace tfdude {
-namespace {
-
-constexpr std::uint64_t kLastCount = 1ULL << 63U;
-
-}  // namespace
-
-// No clock reaches this limit, and counting on from it does not overflow.
 Result<std::uint64_t> read_count(const sqlite::Statement& row, int column) {
   const std::uint64_t count = row.number(column);
-  if (count > kLastCount) return fail(Errc::kState, "a time of " + std::to_string(count));
+  if (count > kLastCounter) return fail(Errc::kState, "a time of " + std::to_string(count));
   return count;
 }
 

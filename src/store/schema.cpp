@@ -29,6 +29,9 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
                                                     "",
                                                     R"(
   CREATE TABLE samples(id TEXT PRIMARY KEY, stamp INTEGER NOT NULL) WITHOUT ROWID;
+)",
+                                                    R"(
+  CREATE TABLE sums(name TEXT PRIMARY KEY, sum INTEGER NOT NULL) WITHOUT ROWID;
 )"};
 
 }  // namespace

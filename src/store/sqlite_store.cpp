@@ -11,6 +11,7 @@
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
 #include "store/read_state.hpp"
+#include "store/row_sums.hpp"
 #include "store/rows.hpp"
 #include "store/schema.hpp"
 #include "store/sqlite.hpp"
@@ -42,6 +43,9 @@ class SqliteStore final : public StateStore {
   Result<StoredState> load() override;
   Result<void> save(const StateChange& change) override;
 
+  /// Erases the rows that are wrong. @return each of them
+  Result<std::vector<std::string>> drop_wrong_rows();
+
  private:
   [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
   [[nodiscard]] tl::unexpected<Error> unreadable(const std::string& why) const;
@@ -64,6 +68,7 @@ class SqliteStore final : public StateStore {
 
   const std::string file_;
   const StoreSync sync_;
+  std::string partition_;
   std::optional<Database> database_;
   bool ready_ = false;             // to be written to
   bool written_ = false;           // by this process
@@ -85,6 +90,7 @@ class SqliteStore final : public StateStore {
   Statement put_absent_;
   Statement erase_sample_;
   Statement put_sample_;
+  RowSums sums_;
 };
 
 tl::unexpected<Error> SqliteStore::unusable(const std::string& why) const {
@@ -101,11 +107,13 @@ tl::unexpected<Error> SqliteStore::unreadable(const std::string& why) const {
 }
 
 Result<void> SqliteStore::open(const std::string& partition) {
+  partition_ = partition;
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(file_).parent_path(), error);
   auto opened = error ? fail(Errc::kState, error.message()) : Database::open(file_);
   if (!opened) return unusable("cannot be opened: " + opened.error().message);
   database_ = std::move(*opened);
+  if (auto installed = RowSums::install(*database_); !installed) return installed;
   if (database_->is_read_only()) {
     return unusable(std::string("can only be read (SQLite code 8)") + kKeep);
   }
@@ -180,7 +188,8 @@ Result<void> SqliteStore::bring_up_to_date() {
   auto done = database_->atomically([&] {
     auto made = database_->run(schema.c_str());
     if (made) made = database_->run(mark.c_str());
-    return made ? prepare_newer() : made;
+    if (made) made = prepare_newer();
+    return made ? sums_.put_all() : made;
   });
   if (done) format_ = kFormat;
   return done;
@@ -195,6 +204,8 @@ Result<void> SqliteStore::create(const std::string& partition) {
       auto about = Statement::prepare(*database_, "INSERT INTO about VALUES(?1, 0)");
       if (!about) return Result<void>(tl::unexpected(about.error()));
       made = about->run(partition);
+      if (made) made = sums_.prepare(*database_);
+      if (made) made = sums_.put_all();
       const std::string marks = "PRAGMA application_id = " + std::to_string(kApplication) +
                                 "; PRAGMA user_version = " + std::to_string(kFormat);
       return made ? database_->run(marks.c_str()) : made;
@@ -240,7 +251,7 @@ Result<void> SqliteStore::prepare_newer() {
   for (const auto& [statement, sql] : all) {
     if (done) done = prepare(*statement, sql);
   }
-  return done;
+  return done ? sums_.prepare(*database_) : done;
 }
 
 Result<void> SqliteStore::prepare(Statement& statement, const char* sql) {
@@ -252,7 +263,30 @@ Result<void> SqliteStore::prepare(Statement& statement, const char* sql) {
 
 Result<StoredState> SqliteStore::load() {
   auto state = read_state(*database_, format_);
-  return state ? std::move(state) : unreadable(state.error().message);
+  if (!state) return unreadable(state.error().message);
+  if (format_ < kSumsFormat) return state;
+  const auto wrong = find_wrong_rows(*database_);
+  if (!wrong) return unreadable(wrong.error().message);
+  if (wrong->empty()) return state;
+  std::string rows;
+  for (const WrongRow& row : *wrong) rows += (rows.empty() ? "" : ", ") + to_string(row);
+  return unusable(
+      "is damaged (the checksum of these rows is wrong: " + rows +
+      "): put a copy of it back, move it away to start from the configuration, or leave "
+      "them out with tfduded --drop-damaged");
+}
+
+Result<std::vector<std::string>> SqliteStore::drop_wrong_rows() {
+  std::vector<std::string> dropped;
+  if (format_ < kSumsFormat) return dropped;
+  const auto wrong = find_wrong_rows(*database_);
+  if (!wrong) return unreadable(wrong.error().message);
+  if (wrong->empty()) return dropped;
+  auto done = make_ready();
+  if (done) done = erase_rows(*database_, *wrong);
+  if (!done) return unusable("could not be mended: " + done.error().message);
+  for (const WrongRow& row : *wrong) dropped.push_back(to_string(row));
+  return dropped;
 }
 
 Result<void> SqliteStore::make_ready() {
@@ -286,14 +320,19 @@ Result<void> SqliteStore::save(const StateChange& change) {
 
 Result<void> SqliteStore::save_frames(const StateChange& change) {
   Result<void> done = set_epoch_.run(change.epoch);
+  if (done) done = sums_.put("about", partition_);
   for (const std::string& id : change.erased) {
     if (done) done = erase_frame_.run(id);
     if (done) done = erase_correlation_.run(id);
     if (done) done = erase_sample_.run(id);
     if (done) done = erase_tombstone_.run(id);
+    for (const char* table : {"frames", "ties", "samples", "notes"}) {
+      if (done) done = sums_.erase(table, id);
+    }
   }
   for (const StoredFrame& frame : change.frames) {
     if (done) done = put_frame_.run(frame.id, frame.parent, frame.X_PC, frame.lamport_time);
+    if (done) done = sums_.put("frames", frame.id);
     if (done) done = save_correlation(frame.id, frame.correlation);
     if (done) done = save_time(frame.id, frame.time);
   }
@@ -301,18 +340,21 @@ Result<void> SqliteStore::save_frames(const StateChange& change) {
     const auto kind = static_cast<std::uint64_t>(tombstone.kind);
     if (done)
       done = put_tombstone_.run(tombstone.id, tombstone.lamport_time, kind, tombstone.rival);
+    if (done) done = sums_.put("notes", tombstone.id);
   }
   return done;
 }
 
 Result<void> SqliteStore::save_absent(const std::vector<Absent>& absent) {
   Result<void> done = clear_absent_.run();
+  if (done) done = sums_.clear("absent");
   for (const Absent& one : absent) {
     // Others may have announced a number too large to be read back.
     const std::uint64_t incarnation = std::min(one.incarnation, IncarnationSource::kEnd);
     const auto kind = static_cast<std::uint64_t>(one.kind);
     const auto since = static_cast<std::uint64_t>(one.since);
     if (done) done = put_absent_.run(one.partition, since, kind, incarnation);
+    if (done) done = sums_.put("absent", one.partition);
   }
   return done;
 }
@@ -324,6 +366,8 @@ Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
     const double variance = joint.variance.value_or(kUnspecifiedVariance);
     if (done) done = put_joint_.run(joint.name, joint.position, variance);
     if (done) done = put_joint_type_.run(joint.name, type);
+    if (done) done = sums_.put("joints", joint.name);
+    if (done) done = sums_.put("joint_types", joint.name);
   }
   return done;
 }
@@ -331,21 +375,28 @@ Result<void> SqliteStore::save_joints(const std::vector<StoredJoint>& joints) {
 Result<void> SqliteStore::save_correlation(const std::string& id,
                                            const StoredCorrelation& correlation) {
   auto done = erase_correlation_.run(id);
+  if (done) done = sums_.erase("ties", id);
   if (!done || correlation.empty()) return done;
   const Blob observed{correlation.observed ? to_blob(*correlation.observed) : std::string()};
-  return put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
+  done = put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
+  return done ? sums_.put("ties", id) : done;
 }
 
 Result<void> SqliteStore::save_time(const std::string& id, const StoredTime& time) {
-  if (!time.stamp && !time.cleared) return erase_sample_.run(id);
+  if (!time.stamp && !time.cleared) {
+    auto done = erase_sample_.run(id);
+    return done ? sums_.erase("samples", id) : done;
+  }
   const std::int64_t stamp = time.stamp ? nanoseconds(*time.stamp) : kClearedStamp;
-  return put_sample_.run(id, static_cast<std::uint64_t>(stamp));
+  auto done = put_sample_.run(id, static_cast<std::uint64_t>(stamp));
+  return done ? sums_.put("samples", id) : done;
 }
 
 Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
   Result<void> done;
   for (const ChangedEdge& edge : edges) {
     if (done) done = set_value_.run(edge.id, edge.X_PC);
+    if (done) done = sums_.put("frames", edge.id);
     if (done) done = save_correlation(edge.id, edge.correlation);
     if (done) done = save_time(edge.id, edge.time);
   }
@@ -354,10 +405,14 @@ Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
 
 Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
   Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
+  if (done) done = sums_.clear("configured");
+  if (done) done = sums_.clear("configured_ties");
   for (const FrameSpec& frame : frames) {
     if (done) done = put_configured_.run(frame.id, frame.parent, value_of(frame));
+    if (done) done = sums_.put("configured", frame.id);
     if (!done || frame.correlation.empty()) continue;
     done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
+    if (done) done = sums_.put("configured_ties", frame.id);
   }
   return done;
 }
@@ -370,6 +425,15 @@ Result<std::unique_ptr<StateStore>> open_sqlite_store(const std::string& file,
   auto store = std::make_unique<SqliteStore>(file, sync);
   if (auto opened = store->open(partition); !opened) return tl::unexpected(opened.error());
   return store;
+}
+
+Result<std::vector<std::string>> drop_wrong_rows(const std::string& file,
+                                                 const std::string& partition) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return std::vector<std::string>();
+  SqliteStore store(file, StoreSync::kEachChange);
+  if (auto opened = store.open(partition); !opened) return tl::unexpected(opened.error());
+  return store.drop_wrong_rows();
 }
 
 }  // namespace tfdude

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "partition/state_store.hpp"
 
@@ -29,5 +30,10 @@ enum class StoreSync {
 [[nodiscard]] Result<std::unique_ptr<StateStore>> open_sqlite_store(
     const std::string& file, const std::string& partition,
     StoreSync sync = StoreSync::kAtCheckpoints);
+
+/// Erases the rows of a state file whose checksums are wrong, and what belongs to them.
+/// @return each of them, such as "frames 'hand'"; kState as open_sqlite_store()
+[[nodiscard]] Result<std::vector<std::string>> drop_wrong_rows(const std::string& file,
+                                                               const std::string& partition);
 
 }  // namespace tfdude

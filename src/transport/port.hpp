@@ -164,6 +164,12 @@ class Transport {
   /// How many messages of senders that took more than their share were dropped unread.
   [[nodiscard]] virtual std::uint64_t dropped() const { return 0; }
 
+  /// How many datagrams were dropped because they are not what a participant sends.
+  [[nodiscard]] virtual std::uint64_t refused_datagrams() const { return 0; }
+
+  /// For how long a thread has been handling one message, if one is; the longest of all threads.
+  [[nodiscard]] virtual std::chrono::nanoseconds busy_for() const { return {}; }
+
   /// How long a new participant needs to discover all others, by experience.
   [[nodiscard]] virtual Milliseconds discovery_time() const = 0;
 };

@@ -14,6 +14,28 @@
 namespace tfdude {
 namespace {
 
+// The segments of an honest request are parts of one path. Few of them need no check: a path has at
+// most as many edges as there are frames.
+Result<void> check_edges(const std::vector<Ends>& segments) {
+  constexpr std::size_t kFew = 16;
+  constexpr std::size_t kMostEdges = 65'536;
+  if (segments.size() <= kFew) return {};
+  std::size_t edges = 0;
+  for (const Ends& ends : segments) {
+    const Version* a = ends.a;
+    const Version* b = ends.b;
+    for (; a != b && edges <= kMostEdges; ++edges) {
+      const Version*& lower = a->depth >= b->depth ? a : b;
+      if (lower->above == nullptr) break;
+      lower = Frames::at(*lower->above, ends.commit);
+    }
+  }
+  if (edges <= kMostEdges) return {};
+  return fail(Errc::kTooMuch, "the " + std::to_string(segments.size()) +
+                                  " segments have more than " + std::to_string(kMostEdges) +
+                                  " edges");
+}
+
 Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathEnds>& segments) {
   const std::uint64_t commit = frames.snapshot();
   std::vector<Ends> all;
@@ -25,6 +47,7 @@ Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathE
     if (end == nullptr) return unknown_end(segment.to);
     all.push_back({start, end, commit});
   }
+  if (auto ok = check_edges(all); !ok) return tl::unexpected(std::move(ok.error()));
   return all;
 }
 

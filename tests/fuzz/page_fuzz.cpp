@@ -34,7 +34,7 @@ void demand_known(const Page& page) {
   demand_shows(replica.forest, replica.directory, without_cycles(plain.oldest()));
   const std::uint64_t next = replica.directory.next_lamport_time(Time{});
   for (const PageEntry& entry : page.entries) {
-    demand(next > entry.lamport_time || entry.lamport_time > 1ULL << 63U,
+    demand(next > entry.lamport_time || entry.lamport_time >= kLastCounter,
            "a Lamport time is later than all seen");
   }
   Page later{page.partition, page.number, page.incarnation, page.epoch, {}};

@@ -5,8 +5,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstddef>
+#include <fcntl.h>
 #include <string>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/un.h>
 #include <thread>
@@ -147,6 +149,49 @@ TEST_CASE("service: while its loop hangs the daemon does not feed the watchdog")
   CHECK(added);
   CHECK(longest >= kHung);
 #endif
+}
+
+TEST_CASE("service: a daemon whose disk hangs ends all the same, and has kept what it confirmed") {
+#ifndef TFDUDE_SLOW_SYNC
+  WARN("SKIPPED: a library cannot be preloaded into a program with sanitizers");
+#else
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  const std::vector<std::string> arguments = {"--config", files.write("arm.yaml", kFrame), "--sync",
+                                              "--state", files.path()};
+  Process daemon = domain.start_daemon(
+      arguments, {"/usr/bin/env", "LD_PRELOAD=" TFDUDE_SLOW_SYNC, "TFDUDE_SYNC_MS=600000",
+                  "TFDUDE_SYNC_IF=" + files.path() + "/hang"});
+  await_ready(daemon);
+  REQUIRE(domain.cli({"add", "kept", "--parent", "arm"}).status == 0);
+  (void)files.write("hang", "");
+  auto client = Client::open(domain.options(tfdude::Milliseconds(500))).value();
+  CHECK_FALSE(client.add("lost", "arm", {}));
+  daemon.signal(SIGTERM);
+  const auto status = daemon.wait(Clock::now() + std::chrono::seconds(12));
+  REQUIRE(status);
+  CHECK(*status == 1);
+  CHECK_THAT(daemon.err(), ContainsSubstring("did not stop in time"));
+  Process again = domain.start_daemon(arguments);
+  await_ready(again);
+  CHECK(domain.cli({"exists", "kept"}).status == 0);
+#endif
+}
+
+TEST_CASE("service: a signal ends a daemon that waits for its configuration") {
+  const TestDomain domain;
+  const TemporaryDirectory files;
+  const std::string fifo = files.path() + "/arm.yaml";
+  REQUIRE(mkfifo(fifo.c_str(), 0600) == 0);
+  Process daemon = domain.start_daemon({"--config", fifo, "--no-state"});
+  int writer = -1;  // can be opened once the daemon reads
+  REQUIRE(testing::eventually([&] {
+    writer = open(fifo.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    return writer >= 0;
+  }));
+  daemon.signal(SIGTERM);
+  CHECK(daemon.wait(testing::in_time()) == 128 + SIGTERM);
+  close(writer);
 }
 
 TEST_CASE("service: lines in the journal have a level, and neither time nor name") {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "partition/counters.hpp"
 #include "support/cdr.hpp"
 #include "support/random.hpp"
 #include "transport/fastdds/codec.hpp"
@@ -109,7 +110,7 @@ bool take(const Bytes& bytes) {
       {5, "hand", UpdateRequest{{edge("hand"), edge("arm"), edge("x")}}},
       {6, "hand", MoveRequest{"arm", {}, 7}},
       {23, "hand", MoveRequest{"arm", {std::nullopt, random.transform().pose.rotation(), {}}, 8}},
-      {7, "hand", MoveRequest{"", random.transform(), 1ULL << 63U}},
+      {7, "hand", MoveRequest{"", random.transform(), kLastCounter}},
       {8, "hand", LookupRequest{{{"hand", "arm"}, {"camera", "world"}}}},
       {9, "hand", UpdateRequest{{edge("hand"), edge("arm")}, time_of(1)}},
       {10, "hand",
@@ -129,17 +130,16 @@ bool take(const Bytes& bytes) {
                        Revision{"arm", random.transform(), correlation(random)}}},
                      time_of(17),
                      18446744073709551615ULL,
-                     18446744073709551614ULL}},
+                     kLastIncarnation}},
       {17, "hand", ConsistencyRequest{true}},
       {18, "arm", JointUpdate{{{"elbow", 0.5, 1e-4}, {"wrist", -2.0, 0}}, time_of(18)}},
       {19, "arm", JointsRequest{}},
       {20, "arm", JointsRequest{"elbow"}},
       {21, "arm", partial_updates(random)},
       {22, "arm", CorrelateRequest{correlation(random)}},
-      {30, "base", ForgetRequest{"arm", 18446744073709551615ULL}},
+      {30, "base", ForgetRequest{"arm", kLastIncarnation}},
       {31, "base", FramesRequest{{"hand", std::string(255, 'i')}}},
-      {32, "base",
-       FramesRequest{{}, {"arm", "left_*"}, {{"arms", 18446744073709551615ULL}, {"legs", 1}}}},
+      {32, "base", FramesRequest{{}, {"arm", "left_*"}, {{"arms", kLastCounter}, {"legs", 1}}}},
       {33, "arm", DescriptionRequest{18446744073709551615ULL}},
       {34, "arm", MemoryRequest{}},
       {40, "hand", AddRequest{"arm", unspecified(random), 1}},
@@ -221,7 +221,7 @@ bool take(const Bytes& bytes) {
 [[nodiscard]] inline std::vector<Reply> replies(Random& random) {
   return {
       {1, 10, Done{}, 1ULL << 62U},
-      {2, 18446744073709551615ULL, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
+      {2, kLastCounter, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
       {3, 0, Error{Errc::kTransport, ""}},
       {4, 30, SegmentValues{}},
       {5, 40,
@@ -279,29 +279,29 @@ bool take(const Bytes& bytes) {
 
 [[nodiscard]] inline std::vector<Page> pages() {
   return {{"robot", 0, 1, 2, {}},
-          {"robot", 7, 18446744073709551615ULL, 3, {{"world", ""}, {"base", "world"}}},
+          {"robot", 7, kLastIncarnation, 3, {{"world", ""}, {"base", "world"}}},
           {std::string(255, 'r'), 4294967295U, 1, 0, {{std::string(255, 'i'), "p"}}},
           {"robot",
            1,
            1,
            9,
-           {{"base", "", 18446744073709551615ULL}},
+           {{"base", "", kLastCounter}},
            {{"hand", 5, Tombstone::Kind::kRemoved, ""},
             {"base", 6, Tombstone::Kind::kUnhung, "arms"},
             {"eye", 7, Tombstone::Kind::kDropped, ""}},
-           {{0, 8}, {4294967295U, 18446744073709551615ULL}},
+           {{0, 8}, {4294967295U, kLastCounter}},
            {{"turn", ""}, {std::string(255, 'j'), "turn"}}}};
 }
 
 [[nodiscard]] inline std::vector<Presence> presences() {
   return {{"robot", 1, "tower", 4711, 3, true},
           {"r",
-           18446744073709551615ULL,
+           kLastIncarnation,
            std::string(255, 'h'),
            4294967295U,
            4294967295U,
            false,
-           {{"arms", -9223372036854775807, Absent::Kind::kForgotten, 18446744073709551615ULL},
+           {{"arms", -9223372036854775807, Absent::Kind::kForgotten, kLastIncarnation},
             {std::string(255, 'a'), 7, Absent::Kind::kSilent, 1}},
            true,
            true,

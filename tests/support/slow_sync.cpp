@@ -1,4 +1,5 @@
-// Preloaded into a process, this makes its disk slow: each sync takes TFDUDE_SYNC_MS longer.
+// Preloaded into a process, this makes its disk slow: each sync takes TFDUDE_SYNC_MS longer, if
+// the file TFDUDE_SYNC_IF exists, or none is named.
 
 #include <chrono>
 #include <cstdlib>
@@ -11,6 +12,8 @@ namespace {
 void take_long() {
   const char* milliseconds = std::getenv("TFDUDE_SYNC_MS");
   if (milliseconds == nullptr) return;
+  const char* file = std::getenv("TFDUDE_SYNC_IF");
+  if (file != nullptr && access(file, F_OK) != 0) return;
   std::this_thread::sleep_for(std::chrono::milliseconds(std::atoi(milliseconds)));
 }
 

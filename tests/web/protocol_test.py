@@ -5,7 +5,9 @@ python3-websockets."""
 import asyncio
 import json
 import math
+import socket
 import struct
+import time
 import unittest
 import urllib.error
 import urllib.request
@@ -107,6 +109,18 @@ def same_rotation(p, q, tolerance):
 
 
 class Protocol(rig.RigTest):
+    def test_connections_that_say_nothing_keep_nobody_out(self):
+        address = self.robot.url.split("//")[1].split("/")[0].split(":")
+        silent = [socket.create_connection((address[0], int(address[1]))) for _ in range(300)]
+        try:
+            start = time.monotonic()
+            with urllib.request.urlopen(self.robot.url, timeout=rig.WAIT) as reply:
+                self.assertEqual(reply.status, 200)
+            self.assertLess(time.monotonic() - start, 5)
+        finally:
+            for one in silent:
+                one.close()
+
     def test_all_frames_and_their_values(self):
         async def talk():
             async with connect(self.robot) as socket:

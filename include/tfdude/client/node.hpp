@@ -66,9 +66,10 @@ class TFDUDE_EXPORT Node : public Client {
   /// @return kUnknownFrame, kNotOwner: then it gives up none; kState.
   [[nodiscard]] Result<void> release(const std::vector<std::string>& ids);
 
-  /// Whether the thread that stores and announces changes is alive: waits until it has done a
-  /// round, even if that could not store them.
-  /// @return false: not within `wait`, because it hangs, or waits for the disk
+  /// Whether the threads that receive messages, and the one that stores and announces changes, are
+  /// alive: waits until the latter has done a round, even if that could not store them.
+  /// @return false: not within `wait`, because it hangs, or waits for the disk; or a message has
+  ///   been handled for longer than that
   [[nodiscard]] bool responds(Milliseconds wait);
 
   /// Calls a function when another process has taken over the partition. As on_change(), but it

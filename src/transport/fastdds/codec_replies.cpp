@@ -223,7 +223,7 @@ constexpr auto kBody =
           TFDUDE_CASE(14, MemoryOffer, memory, kMemory));
 
 constexpr auto kReply = record(
-    TFDUDE_FIELD(epoch, epoch, Count64()), TFDUDE_FIELD(lamport_time, lamport_time, Count64()),
+    TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),
     TFDUDE_FIELD(sequence_number, sequence, Count32()), TFDUDE_FIELD(body, body, kBody));
 
 }  // namespace

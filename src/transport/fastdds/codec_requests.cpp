@@ -18,10 +18,10 @@ namespace {
 
 constexpr auto kAdd =
     record(TFDUDE_FIELD(parent, parent, Text()), TFDUDE_FIELD(x_pc, X_PC, GivenTransform()),
-           TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+           TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime));
 
 constexpr auto kRemove = record(TFDUDE_FIELD(tops, tops, List(Text())),
-                                TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+                                TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime));
 
 // The id of the first edge is that of the request.
 struct FirstEdge : GivenTransform {
@@ -48,11 +48,11 @@ constexpr auto kPartialUpdate =
           at_least_one(&PartialUpdateRequest::edges, "an update without edges"));
 
 constexpr auto kMove = record(TFDUDE_FIELD(parent, parent, Text()),
-                              TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+                              TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime));
 
 constexpr auto kMoveAndUpdate =
     record(TFDUDE_FIELD(parent, parent, Text()), TFDUDE_FIELDS(X_PC, PartialNumbers()),
-           TFDUDE_FIELD(lamport_time, lamport_time, Count64()));
+           TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime));
 
 bool only_moves(const MoveRequest& move) { return move.X_PC.empty(); }
 
@@ -61,7 +61,7 @@ constexpr auto kJoints =
 
 constexpr auto kCorrelate = record(TFDUDE_FIELDS(correlation, AnyCorrelation()));
 
-constexpr auto kForget = record(TFDUDE_FIELD(incarnation, incarnation, Count64()),
+constexpr auto kForget = record(TFDUDE_FIELD(incarnation, incarnation, kIncarnation),
                                 TFDUDE_FIELD(partition, partition, Text()));
 
 // ---- observations
@@ -110,11 +110,12 @@ constexpr auto kRevisedEdge = record(
     TFDUDE_FIELD(variance, innovation.variance, Real()), TFDUDE_FIELD_OF_ALL(id, RevisedId()),
     TFDUDE_FIELD(refused, refused, Octet()), field(TFDUDE_ALL, TFDUDE_ALL, Revised()));
 
-constexpr auto kRevise = Ruled(
-    record(TFDUDE_FIELD(stamp, stamp, Stamp("the stamp of an observation")),
-           TFDUDE_FIELD(seen, seen, Count64()), TFDUDE_FIELD(incarnation, incarnation, Count64()),
-           TFDUDE_FIELD(edges, edges, List(kRevisedEdge, kMaxCorrelated))),
-    at_least_one(&ReviseRequest::edges, "an observation without edges"));
+constexpr auto kRevise =
+    Ruled(record(TFDUDE_FIELD(stamp, stamp, Stamp("the stamp of an observation")),
+                 TFDUDE_FIELD(seen, seen, Count64()),
+                 TFDUDE_FIELD(incarnation, incarnation, kIncarnation),
+                 TFDUDE_FIELD(edges, edges, List(kRevisedEdge, kMaxCorrelated))),
+          at_least_one(&ReviseRequest::edges, "an observation without edges"));
 
 // ---- questions
 
@@ -171,7 +172,7 @@ constexpr auto kJointStates = record(TFDUDE_FIELDS(after, Text()));
 constexpr auto kFrames =
     record(TFDUDE_FIELD(ids, ids, List(Id("id"))), TFDUDE_FIELD(trees, trees, List(Id("tree"))),
            TFDUDE_FIELD(seen, seen,
-                        List(record(TFDUDE_FIELD(epoch, epoch, Count64()),
+                        List(record(TFDUDE_FIELD(epoch, epoch, kEpoch),
                                     TFDUDE_FIELD(partition, partition, PartitionName())))));
 
 constexpr auto kDescription = record(TFDUDE_FIELDS(from, Count64()));

@@ -18,37 +18,36 @@ struct Incarnation : Count64 {
   }
   template <class Message>
   static Result<void> read(std::uint64_t wire, Message& message, const Place&) {
-    message.incarnation = wire;
-    if (wire != 0) return {};
+    if (wire != 0) return kIncarnation.read(wire, message.incarnation, {});
     return fail(Errc::kInvalidInput, "incarnation 0 of partition " + quote(message.partition));
   }
 };
 
 constexpr auto kEntry =
-    record(TFDUDE_FIELD(lamport_time, lamport_time, Count64()), TFDUDE_FIELD(id, id, Id("id")),
+    record(TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime), TFDUDE_FIELD(id, id, Id("id")),
            TFDUDE_FIELD(parent, parent, Id("parent", true)));
 
 constexpr auto kTombstone =
-    record(TFDUDE_FIELD(lamport_time, lamport_time, Count64()),
+    record(TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),
            TFDUDE_FIELD(kind, kind, Enumerated(Tombstone::Kind::kDropped, "a tombstone")),
            TFDUDE_FIELD(id, id, Id("id")), TFDUDE_FIELD(rival, rival, PartitionName(true)));
 
 constexpr auto kPageEpoch =
-    record(TFDUDE_FIELD(epoch, epoch, Count64()), TFDUDE_FIELD(number, number, Count32()));
+    record(TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(number, number, Count32()));
 
 constexpr auto kPageJoint = record(TFDUDE_FIELD(name, name, Id("joint")),
                                    TFDUDE_FIELD(follows, follows, Id("joint", true)));
 
 constexpr auto kPage = record(
     TFDUDE_FIELD(partition, partition, PartitionName()), TFDUDE_FIELD(number, number, Count32()),
-    TFDUDE_FIELD_OF_ALL(incarnation, Incarnation()), TFDUDE_FIELD(epoch, epoch, Count64()),
+    TFDUDE_FIELD_OF_ALL(incarnation, Incarnation()), TFDUDE_FIELD(epoch, epoch, kEpoch),
     TFDUDE_FIELD(entries, entries, List(kEntry)),
     TFDUDE_FIELD(tombstones, tombstones, List(kTombstone)),
     TFDUDE_FIELD(others, others, List(kPageEpoch)), TFDUDE_FIELD(joints, joints, List(kPageJoint)));
 
 constexpr auto kAbsent =
     record(TFDUDE_FIELD(since, since, Number<std::int64_t>()),
-           TFDUDE_FIELD(incarnation, incarnation, Count64()),
+           TFDUDE_FIELD(incarnation, incarnation, kIncarnation),
            TFDUDE_FIELD(kind, kind, Enumerated(Absent::Kind::kForgotten, "an absence")),
            TFDUDE_FIELD(partition, partition, PartitionName()));
 

@@ -116,7 +116,7 @@ class GatedTransport final : public SendFilter {
     if (descriptor_.discovering != nullptr && !descriptor_.data_ports.contain(local.port)) {
       one_by_one = std::unique_lock(*descriptor_.discovering);
     }
-    const Gate::Pass pass(*descriptor_.gate);
+    const Gate::Pass pass(*descriptor_.gate, now);
     if (!pass) return;
     descriptor_.life_signs->heard(bytes, size, now);
     descriptor_.acknowledgements->heard(bytes, size);

@@ -9,6 +9,7 @@
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
+#include "base/token_bucket.hpp"
 #include "transport/fastdds/announcement.hpp"
 #include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -139,6 +140,21 @@ Result<void> FastDdsTransport::create_endpoints() {
                                   },
                                   nullptr});
   }
+  if (access_.may_look()) read_replies();
+  if (!presence_->check()) return presence_->check();
+  if (pages_ != nullptr && !pages_->check()) return pages_->check();
+  if (replies_ != nullptr && !replies_->check()) return replies_->check();
+  if (auto clock = clock_->check(); !clock) return clock;
+  const std::string& own = options_.partition;
+  if (own.empty()) return {};
+  presence_writer_ = std::make_unique<Writer>(context(), *topics_.presence, own, "presence_writer");
+  directory_writer_ =
+      std::make_unique<Writer>(context(), *topics_.directory, own, "directory_writer");
+  return presence_writer_->check() ? directory_writer_->check() : presence_writer_->check();
+}
+
+void FastDdsTransport::read_replies() {
+  using Info = edds::SampleInfo;
   replies_ = std::make_unique<Reader<wire::Reply>>(
       context(), *topics_.reply, reply_partition(kAllOwners, self_), "call_reader",
       Reader<wire::Reply>::Calls{
@@ -147,16 +163,6 @@ Result<void> FastDdsTransport::create_endpoints() {
             if (change <= 0) return reply_paths_.closed(writer);
             reply_paths_.opened(writer, owner_of_replies(writer_partitions_.of(writer)));
           }});
-  if (!presence_->check()) return presence_->check();
-  if (pages_ != nullptr && !pages_->check()) return pages_->check();
-  if (!replies_->check()) return replies_->check();
-  if (auto clock = clock_->check(); !clock) return clock;
-  const std::string& own = options_.partition;
-  if (own.empty()) return {};
-  presence_writer_ = std::make_unique<Writer>(context(), *topics_.presence, own, "presence_writer");
-  directory_writer_ =
-      std::make_unique<Writer>(context(), *topics_.directory, own, "directory_writer");
-  return presence_writer_->check() ? directory_writer_->check() : presence_writer_->check();
 }
 
 Result<edds::ContentFilteredTopic*> FastDdsTransport::create_filtered(
@@ -348,10 +354,25 @@ void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
 
 namespace tfdude {
 
+namespace {
+
+// What strangers send must not fill a disk with what Fast DDS says of it.
+class BoundedConsumer final : public fastdds::edds::StdoutErrConsumer {
+ public:
+  void Consume(const fastdds::edds::Log::Entry& entry) override {
+    if (lines_.take(TokenBucket::Clock::now())) StdoutErrConsumer::Consume(entry);
+  }
+
+ private:
+  TokenBucket lines_{10, 1000};
+};
+
+}  // namespace
+
 void log_fastdds_to_standard_error() {
   using fastdds::edds::Log;
   Log::ClearConsumers();
-  Log::RegisterConsumer(std::make_unique<fastdds::edds::StdoutErrConsumer>());
+  Log::RegisterConsumer(std::make_unique<BoundedConsumer>());
 }
 
 Result<TransportPtr> make_fastdds_transport(const FastDdsOptions& options) {

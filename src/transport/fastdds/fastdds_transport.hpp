@@ -83,6 +83,8 @@ class FastDdsTransport final : public Transport {
   }
   std::vector<std::string> excluded() const override { return admission_.excluded(); }
   std::uint64_t dropped() const override { return fair_share_.dropped(); }
+  std::uint64_t refused_datagrams() const override { return guard_->refused(); }
+  std::chrono::nanoseconds busy_for() const override { return gate_->busy_for(Gate::Clock::now()); }
   std::vector<IncompatiblePeer> incompatible() const override { return peers_.incompatible(); }
   Milliseconds discovery_time() const override;
 
@@ -99,6 +101,7 @@ class FastDdsTransport final : public Transport {
  private:
   Result<void> create_participant();
   Result<void> create_endpoints();
+  void read_replies();
   void take_times(edds::DomainParticipantQos& qos);
   Result<edds::ContentFilteredTopic*> create_filtered(edds::Topic* topic,
                                                       const std::string& partition);

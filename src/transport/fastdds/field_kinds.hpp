@@ -14,6 +14,7 @@
 #include "tfdude/base/time.hpp"
 
 #include "base/cdr.hpp"
+#include "partition/counters.hpp"
 #include "partition/messages.hpp"
 
 // A message is described once: its fields in the order of idl/tfdude.idl, each with its kind. A
@@ -55,6 +56,26 @@ using Octet = Number<std::uint8_t>;
 using Count32 = Number<std::uint32_t>;
 using Count64 = Number<std::uint64_t>;
 using Real = Number<double>;
+
+/// A number that others count on from (counters.hpp).
+struct Counter : Count64 {
+  const char* field;
+  std::uint64_t last;
+  explicit constexpr Counter(const char* name, std::uint64_t its_last = kLastCounter)
+      : field(name), last(its_last) {}
+
+  Result<void> read(std::uint64_t wire, std::uint64_t& value, const Place& place) const {
+    if (wire > last) {
+      return tfdude::fail(Errc::kInvalidInput, std::string(field) + " of " + std::to_string(wire) +
+                                                   " is beyond " + std::to_string(last));
+    }
+    return Count64::read(wire, value, place);
+  }
+};
+
+inline constexpr Counter kLamportTime{"a Lamport time"};
+inline constexpr Counter kEpoch{"an epoch"};
+inline constexpr Counter kIncarnation{"an incarnation", kLastIncarnation};
 
 /// A boolean of the IDL: the generated code throws at any other value than 0 and 1.
 struct Boolean : Number<bool> {

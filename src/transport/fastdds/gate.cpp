@@ -1,5 +1,7 @@
 #include "transport/fastdds/gate.hpp"
 
+#include <algorithm>
+
 #include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
@@ -33,6 +35,33 @@ void Gate::leave() {
   // The lock prevents a notification between the other thread's check and its sleep.
   { const Lock lock(mutex_); }
   changed_.notify_all();
+}
+
+// @return kPlaces: no place is free, and this datagram is not watched
+std::size_t Gate::begin(Clock::time_point now) {
+  const Clock::rep ticks = now.time_since_epoch().count();
+  for (std::size_t place = 0; place < kPlaces; ++place) {
+    Clock::rep none = 0;
+    if (began_[place].load(std::memory_order_relaxed) == 0 &&
+        began_[place].compare_exchange_strong(none, ticks, std::memory_order_relaxed)) {
+      return place;
+    }
+  }
+  return kPlaces;
+}
+
+void Gate::end(std::size_t place) {
+  if (place < kPlaces) began_[place].store(0, std::memory_order_relaxed);
+}
+
+Gate::Clock::duration Gate::busy_for(Clock::time_point now) const {
+  Clock::duration longest{0};
+  for (const auto& began : began_) {
+    const Clock::rep ticks = began.load(std::memory_order_relaxed);
+    if (ticks == 0) continue;
+    longest = std::max(longest, now - Clock::time_point(Clock::duration(ticks)));
+  }
+  return longest;
 }
 
 void Gate::shut() {

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <chrono>
+#include <cstddef>
 
 #include "base/mutex.hpp"
 
@@ -16,13 +19,17 @@ namespace tfdude::fastdds {
 ///   additions.
 class Gate {
  public:
+  using Clock = std::chrono::steady_clock;
+
   /// Held while a datagram is handled; its constructor waits while the gate is shut. If it converts
   /// to false, drop the datagram.
   class Pass {
    public:
-    explicit Pass(Gate& gate) : gate_(gate), entered_(gate.enter()) {}
+    explicit Pass(Gate& gate, Clock::time_point now = Clock::now())
+        : gate_(gate), place_(gate.begin(now)), entered_(gate.enter()) {}
     ~Pass() {
       if (entered_) gate_.leave();
+      gate_.end(place_);
     }
     Pass(const Pass&) = delete;
     Pass& operator=(const Pass&) = delete;
@@ -30,6 +37,7 @@ class Gate {
 
    private:
     Gate& gate_;
+    const std::size_t place_;
     const bool entered_;
   };
 
@@ -49,13 +57,24 @@ class Gate {
   /// Drops all datagrams from now on; returns when none is being handled any more.
   void close();
 
+  /// For how long the datagram that is being handled for longest has been so, or has waited for
+  /// the end of a pause; zero: there is none.
+  [[nodiscard]] Clock::duration busy_for(Clock::time_point now) const;
+
  private:
+  // More threads than receive, those of Fast DDS have one socket each.
+  static constexpr std::size_t kPlaces = 32;
+
+  std::size_t begin(Clock::time_point now);
+  void end(std::size_t place);
   bool enter();
   void leave();
   void shut();
   void open();
   void wait_until_empty(Lock& lock);
 
+  // When each thread with a datagram began, in the clock's ticks; 0: none.
+  std::array<std::atomic<Clock::rep>, kPlaces> began_{};
   std::atomic<int> inside_{0};
   std::atomic<bool> shut_{false};  // a Pause exists, or the gate is closed
   Mutex mutex_;                    // guards the rest

@@ -1,7 +1,5 @@
 #include "transport/fastdds/profiles.hpp"
 
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string_view>
 
@@ -10,6 +8,7 @@
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
+#include "description/file_text.hpp"
 #include "transport/fastdds/builtin_profiles.hpp"
 #include "transport/fastdds/identity.hpp"
 #include "transport/fastdds/profile_text.hpp"
@@ -82,11 +81,9 @@ Result<Profiles> Profiles::load(const std::string& file) {
       return Profiles(ending);
     });
   }
-  std::ifstream stream(file);
-  if (!stream.good()) {
-    return fail(Errc::kConfig, "profile file " + quote(file) + " cannot be opened");
-  }
-  auto own = make_known({std::istreambuf_iterator<char>(stream), {}});
+  const auto text = read_text(file);
+  if (!text) return fail_at("profile file", text.error());
+  auto own = make_known(*text);
   if (!own) {
     return fail(Errc::kConfig, "profile file " + quote(file) +
                                    " is not a valid Fast DDS profile file: " + own.error().message);

@@ -101,6 +101,8 @@ TEST_CASE("a new id does not look like another one") {
   CHECK(said(" ") == "id ' ' begins with a space");
   CHECK(said(" a") == "id ' a' begins with a space");
   CHECK(said("a ") == "id 'a ' ends with a space");
+  CHECK(said("-rf") == "id '-rf' begins with '-', like an option");
+  CHECK(said("a-b-").empty());
   CHECK(contains(said("a\t"), "control character"));
   // No-break, narrow, ideographic and zero-width spaces, a joiner, marks of direction, a soft
   // hyphen, a filler, a variation selector, a tag.

@@ -1,5 +1,6 @@
 #include "tfdude/description/urdf.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -49,6 +50,19 @@ TEST_CASE("urdf: links become frames and joints move them") {
   const auto plain = frames_of(pair("planar", "<origin xyz=\"1 2 3\"/><axis xyz=\"0 0 0\"/>"));
   CHECK_FALSE(plain[1].joint.has_value());
   CHECK(plain[1].X_PC.pose.translation() == Eigen::Vector3d(1, 2, 3));
+}
+
+// TinyXML compares each attribute with all before it.
+TEST_CASE("urdf: an element with attributes without end is rejected at once") {
+  std::string many = "<robot name=\"r\"><!-- a=b --><link";
+  for (int i = 0; i < 300'000; ++i) many += " a" + std::to_string(i) + "='>'";
+  const auto start = std::chrono::steady_clock::now();
+  refused(many + " name=\"x\"/></robot>", "r.urdf:1: an element has more than 256 attributes",
+          Errc::kTooMuch);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(2));
+  std::string comment = "<robot name=\"r\"><!-- ";
+  for (int i = 0; i < 1000; ++i) comment += "a=b ";
+  CHECK(ids_of(frames_of(comment + "--><link name=\"x\"/></robot>")) == "x");
 }
 
 TEST_CASE("urdf: elements that do not concern frames are ignored") {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <unistd.h>
 
 #include <openssl/pkcs7.h>
 
@@ -79,6 +80,42 @@ TEST_CASE("keys: a key that others can read is rejected") {
   }
   fs::permissions(files.key, fs::perms(0400));
   CHECK(find_keys(store.path("arm"), kKeysTime));
+}
+
+TEST_CASE("keys: a directory or file that others can change is rejected") {
+  const TestKeys store;
+  const KeyFiles files = store.add("arm", daemon_of("arm"));
+  const std::string directory = store.path("arm");
+  for (const std::string& path : {directory, files.certificate, files.authority, files.revoked,
+                                  files.governance, files.permissions}) {
+    const fs::perms good = fs::status(path).permissions();
+    for (const unsigned mode : {0020U, 0002U}) {
+      fs::permissions(path, fs::perms(mode), fs::perm_options::add);
+      CHECK_THAT(error_at(directory), ContainsSubstring(path + ": others than its owner can"));
+      fs::permissions(path, good);
+    }
+    fs::permissions(path, fs::perms(0044), fs::perm_options::add);
+    CHECK(find_keys(directory, kKeysTime));
+    fs::permissions(path, good);
+  }
+}
+
+TEST_CASE("keys: a directory or file of another user is rejected") {
+  if (geteuid() != 0) {
+    WARN("SKIPPED: only root can give files away");
+    return;
+  }
+  const TestKeys store;
+  const KeyFiles files = store.add("arm", daemon_of("arm"));
+  const std::string directory = store.path("arm");
+  constexpr uid_t kNobody = 65534;
+  for (const std::string& path : {directory, files.key, files.certificate, files.authority,
+                                  files.revoked, files.governance, files.permissions}) {
+    REQUIRE(chown(path.c_str(), kNobody, kNobody) == 0);
+    CHECK_THAT(error_at(directory), ContainsSubstring(path + ": belongs to user 65534"));
+    REQUIRE(chown(path.c_str(), 0, 0) == 0);
+  }
+  CHECK(find_keys(directory, kKeysTime));
 }
 
 TEST_CASE("keys: changed permissions are found") {

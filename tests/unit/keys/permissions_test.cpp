@@ -126,6 +126,23 @@ TEST_CASE("permissions: a daemon serves its partition and looks at others") {
   }
 }
 
+TEST_CASE("permissions: only who may ask reads replies") {
+  for (const Roles& roles : {looking(), moving("arm"), observing(), daemon_of("arm")}) {
+    CHECK(Decision(roles).subscribes(kReplyTopic, "*/0123"));
+  }
+  Roles clock;
+  clock.clock = true;
+  for (const Roles& roles : {streaming("arm"), clock}) {
+    const Decision deaf(roles);
+    deaf.check_rules();
+    for (const char* partition : {"*/0123", "arm/0123", "*", "*/*", ""}) {
+      CHECK_FALSE(deaf.subscribes(kReplyTopic, partition));
+      CHECK_FALSE(deaf.subscribes(kStateTopic, partition));
+    }
+    CHECK(deaf.subscribes(kDirectoryTopic, "*"));
+  }
+}
+
 TEST_CASE("permissions: a client that may look changes nothing") {
   const Decision client(looking());
   client.check_rules();

@@ -43,6 +43,15 @@ TEST_CASE("an incarnation that no clock could give is ignored") {
   CHECK(source.next(at(0), 0) < 1ULL << 21U);
 }
 
+TEST_CASE("an incarnation stays within the range of those that are accepted") {
+  IncarnationSource source;
+  source.saw(kLastIncarnation);
+  for (const std::uint64_t random : {std::uint64_t{0}, ~std::uint64_t{0}}) {
+    CHECK(source.next(at(0), random) < IncarnationSource::kEnd);
+    CHECK(source.next(at(0), random) > kLastIncarnation - (2ULL << IncarnationSource::kRandomBits));
+  }
+}
+
 TEST_CASE("processes that start at the same instant get different incarnations") {
   Random random(0x1ca2);
   INFO("seed " << random.seed());

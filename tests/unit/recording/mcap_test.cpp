@@ -306,6 +306,41 @@ TEST_CASE("mcap: an index of a billion records is refused, with bounded memory")
   CHECK(reader.error().code == Errc::kTooMuch);
 }
 
+// A small file could otherwise have one chunk unpacked without end.
+TEST_CASE("mcap: a chunk that the summary names many times is read once") {
+  const std::string whole = written(100, true);
+  // The index of the first chunk again and again, in the summary. Without its CRC.
+  const std::size_t footer = whole.size() - 8 - 29;
+  ByteReader end(std::string_view(whole).substr(footer + 9));
+  const std::uint64_t summary = end.u64();
+  std::string records = whole.substr(summary, footer - summary);
+  std::string index;
+  for (std::size_t at = 0; at < records.size() && index.empty();) {
+    ByteReader reader(std::string_view(records).substr(at));
+    const auto op = static_cast<Op>(reader.u8());
+    const std::uint64_t length = reader.u64();
+    if (op == Op::kSummaryOffset) break;
+    if (op == Op::kChunkIndex) index = records.substr(at, 9 + length);
+    at += 9 + length;
+  }
+  REQUIRE_FALSE(index.empty());
+  std::string many = whole.substr(0, summary);
+  for (int i = 0; i < 1000; ++i) many += index;
+  many += records;
+  std::string tail;
+  ByteWriter writer(tail);
+  writer.u64(summary);
+  writer.u64(0);
+  writer.u32(0);
+  append(many, Op::kFooter, tail);
+  many += whole.substr(whole.size() - 8);
+  auto reader = opened(many);
+  REQUIRE(reader);
+  CHECK(all_of(*reader).size() == 100);
+  REQUIRE_FALSE(reader->problems().empty());
+  CHECK(reader->problems().back() == "1000 chunks are named more than once, or lie in another one");
+}
+
 TEST_CASE("mcap: the writer stops with the error of its sink") {
   int calls = 0;
   McapWriter writer(

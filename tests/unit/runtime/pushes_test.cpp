@@ -65,6 +65,47 @@ struct PushingOwner final : Pushes::Sink {
 
 }  // namespace
 
+// Each group costs a DDS writer, which all participants discover.
+TEST_CASE("pushes: one watcher cannot begin groups without end, others still can") {
+  PushingOwner owner;
+  const PeerId greedy{1};
+  const PeerId honest{2};
+  std::size_t begun = 0;
+  std::string why;
+  const auto start = Pushes::Clock::now();
+  for (std::uint64_t group = 1; group <= 1000; ++group) {
+    const auto watched = owner.pusher.watch(group, {{kHand}}, greedy);
+    begun += watched ? 1 : 0;
+    if (!watched) why = watched.error().message;
+    if (!watched) CHECK(watched.error().code == Errc::kTooMuch);
+  }
+  const std::chrono::duration<double> time = Pushes::Clock::now() - start;
+  CHECK(begun >= static_cast<std::size_t>(Pushes::kNewAtOnce));
+  CHECK(static_cast<double>(begun) <=
+        Pushes::kNewAtOnce + 1 + time.count() * Pushes::kNewPerSecond);
+  CHECK(begun <= 500);
+  CHECK(why.find("this participant") != std::string::npos);
+  CHECK(owner.pusher.refused() == 1000 - begun);
+  CHECK(owner.pusher.watch(1, {{kHand}}, greedy));     // renewed
+  CHECK(owner.pusher.watch(5000, {{kHand}}, honest));  // another one
+  CHECK(owner.pusher.watch(5001, {{kHand}}));          // this process
+}
+
+TEST_CASE("pushes: the edges of all groups together are bounded") {
+  PushingOwner owner;
+  std::size_t edges = 0;
+  bool refused = false;
+  for (std::uint64_t group = 1; group <= 100 && !refused; ++group) {
+    const WatchRequest request{std::vector<PathEnds>(kMaxItems, kHand)};
+    const auto watched = owner.pusher.watch(group, request);
+    if (watched) edges += kMaxItems;
+    refused = !watched && watched.error().code == Errc::kTooMuch;
+  }
+  CHECK(refused);
+  CHECK(edges <= Pushes::kMostEdges);
+  CHECK(edges > Pushes::kMostEdges / 2);
+}
+
 TEST_CASE("pushes: every sample of a watched edge is pushed and nothing of other edges") {
   PushingOwner owner;
   for (int t = 1; t <= 100; ++t) REQUIRE(owner.forest.update("hand", along_x(t), ms(t)));

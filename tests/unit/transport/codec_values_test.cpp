@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "partition/counters.hpp"
 #include "support/catch.hpp"
 #include "support/samples.hpp"
 
@@ -13,6 +14,44 @@ Sample travelled(const Sample& sample) {
   Sample arrived;
   REQUIRE(testing::deserialized<Type>(testing::serialized<Type>(sample), arrived));
   return arrived;
+}
+
+TEST_CASE("a number that others count on from has a range, and what is beyond is named") {
+  const auto move = [](std::uint64_t time) {
+    const auto read = from_wire(
+        travelled<RequestType>(to_wire(Request{7, "hand", MoveRequest{"arm", {}, time}}, "arms")));
+    return read ? "ok" : read.error().message;
+  };
+  CHECK(move(kLastCounter) == "ok");
+  CHECK(move(kLastCounter + 1) ==
+        "a Lamport time of 9223372036854775809 is beyond 9223372036854775808");
+  CHECK(move(~0ULL) != "ok");
+  const auto page = [](std::uint64_t incarnation, std::uint64_t epoch, std::uint64_t entry,
+                       std::uint64_t tombstone) {
+    const Page one{"arms",
+                   0,
+                   incarnation,
+                   epoch,
+                   {{"hand", "arm", entry}},
+                   {{"lamp", tombstone, Tombstone::Kind::kRemoved, ""}}};
+    return from_wire(travelled<PageType>(to_wire(one))).has_value();
+  };
+  CHECK(page(kLastIncarnation, kLastCounter, kLastCounter, kLastCounter));
+  CHECK_FALSE(page(kLastIncarnation + 1, 1, 1, 1));
+  CHECK_FALSE(page(1, kLastCounter + 1, 1, 1));
+  CHECK_FALSE(page(1, 1, kLastCounter + 1, 1));
+  CHECK_FALSE(page(1, 1, 1, kLastCounter + 1));
+  const auto presence = [](std::uint64_t incarnation, std::uint64_t absent) {
+    Presence one{"arms", incarnation, "host", 1, 0, true};
+    one.absent = {{"legs", 0, Absent::Kind::kLost, absent}};
+    return from_wire(travelled<PresenceType>(to_wire(one))).has_value();
+  };
+  CHECK(presence(kLastIncarnation, kLastIncarnation));
+  CHECK_FALSE(presence(kLastIncarnation + 1, 1));
+  CHECK_FALSE(presence(1, kLastIncarnation + 1));
+  Reply reply;
+  reply.lamport_time = kLastCounter + 1;
+  CHECK_FALSE(from_wire(travelled<ReplyType>(to_wire(reply))));
 }
 
 TEST_CASE("an unspecified covariance and an unspecified variance take no bytes") {

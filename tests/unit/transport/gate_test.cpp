@@ -87,6 +87,22 @@ TEST_CASE("gate: a thread inside may pause the gate") {
   CHECK(pass);
 }
 
+TEST_CASE("gate: the datagram that takes longest is known") {
+  Gate gate;
+  const Gate::Clock::time_point start(std::chrono::hours(1));
+  CHECK(gate.busy_for(start) == Gate::Clock::duration(0));
+  {
+    const Gate::Pass first(gate, start);
+    CHECK(gate.busy_for(start + milliseconds(70)) == milliseconds(70));
+    {
+      const Gate::Pass second(gate, start + milliseconds(20));
+      CHECK(gate.busy_for(start + milliseconds(70)) == milliseconds(70));
+    }
+    CHECK(gate.busy_for(start + milliseconds(80)) == milliseconds(80));
+  }
+  CHECK(gate.busy_for(start + milliseconds(90)) == Gate::Clock::duration(0));
+}
+
 TEST_CASE("gate: no thread is inside during a pause") {
   Gate gate;
   std::atomic<bool> over{false};

@@ -91,7 +91,7 @@ TEST_CASE("number bounds: a process with the same GUID begins again") {
 }
 
 // Fast DDS walks from the oldest sample to the one that was acknowledged, when a reader that keeps
-// samples begins anew.
+// samples starts again.
 TEST_CASE("number bounds: only what was sent is acknowledged") {
   Heard heard;
   constexpr std::uint64_t kSlack = NumberBounds::kUnannounced;
