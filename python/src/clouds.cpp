@@ -91,13 +91,19 @@ Cloud transform_cloud(const Session& session, const std::string& a, const std::s
           query.covariances};
 }
 
-/// By one transform.
+/// By one transform, into memory of another cloud. It is never freed: arrays show it.
 template <class Number>
-Cloud by_transform(const Transform& X_AB, py::handle points, bool covariances, py::handle own) {
+void by_transform(const Transform& X_AB, py::handle points, bool covariances, py::handle own,
+                  Cloud& out, bool is_new) {
   const Numbers<Number> given = to_cloud<Number>(points);
   const auto from = columns(given);
   const Eigen::Matrix3d own_covariance = to_own(own);
-  TransformedCloud<Number> cloud;
+  if (is_new) out.all = TransformedCloud<Number>();
+  auto* const same = std::get_if<TransformedCloud<Number>>(&out.all);
+  if (same == nullptr || (!is_new && same->points.cols() != from.cols())) {
+    throw py::value_error("out must have as many points, of the same type of numbers");
+  }
+  auto& cloud = *same;
   {
     const py::gil_scoped_release others;
     cloud.points.resize(3, from.cols());
@@ -109,7 +115,8 @@ Cloud by_transform(const Transform& X_AB, py::handle points, bool covariances, p
     }
   }
   cloud.complete = X_AB.covariance.complete();
-  return {std::move(cloud), covariances};
+  cloud.basis = {};
+  out.has_covariances = covariances;
 }
 
 /// A view of numbers of the cloud, which it keeps alive.
@@ -227,16 +234,27 @@ void bind_clouds(py::module_& module, ClientClass& cls, py::handle transform) {
       "has\n"
       "no data.");
   transform.attr("transform_cloud") = py::cpp_function(
-      [](const Transform& X_AB, py::handle points, bool covariance, py::handle own) {
+      [](const Transform& X_AB, py::handle points, bool covariance, py::handle own,
+         py::object out) {
+        const bool is_new = out.is_none();
+        if (is_new) out = py::cast(Cloud());
         const bool with = covariance || !own.is_none();
-        return is_single(points) ? by_transform<float>(X_AB, points, with, own)
-                                 : by_transform<double>(X_AB, points, with, own);
+        auto& cloud = out.cast<Cloud&>();
+        if (is_single(points)) {
+          by_transform<float>(X_AB, points, with, own, cloud, is_new);
+        } else {
+          by_transform<double>(X_AB, points, with, own, cloud, is_new);
+        }
+        return out;
       },
       py::name("transform_cloud"), py::is_method(transform), py::arg("points"), py::kw_only(),
-      py::arg("covariance") = false, py::arg("own") = py::none(),
+      py::arg("covariance") = false, py::arg("own") = py::none(), py::arg("out") = py::none(),
       "A cloud of points (N, 3) of the child, in the parent: a Cloud, in float32 or float64 as\n"
       "given. covariance: also compute one for each point. own: (3, 3), of each point's own "
-      "error.");
+      "error.\n"
+      "out: a Cloud of as many points, of the same type, which is overwritten and returned: that "
+      "is\n"
+      "several times as fast for millions. Its arrays show the new points.");
 }
 
 }  // namespace tfdude::python

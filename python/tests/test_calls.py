@@ -98,6 +98,16 @@ def test_cloud(network, car, kind):
         X.transform_cloud(points).covariances
     with pytest.raises(ValueError, match=r"\(N, 3\), not"):
         X.transform_cloud(points.T)
+    # Into memory that exists.
+    view = same.points
+    assert X.transform_cloud(points[::-1], out=same) is same
+    assert np.allclose(view, expected.coordinates[::-1], atol=1e-5)
+    with pytest.raises(ValueError, match="covariance=True"):
+        same.upper
+    assert np.allclose(X.transform_cloud(points, covariance=True, out=same).upper, cloud.upper, rtol=1e-4, atol=1e-9)
+    for wrong in (points[1:], points.astype(np.float32 if kind is np.float64 else np.float64)):
+        with pytest.raises(ValueError, match="as many points"):
+            X.transform_cloud(wrong, out=same)
     # Any strides.
     assert np.allclose(X.transform_cloud(points[::-2]).points, expected.coordinates[::-2], atol=1e-5)
 

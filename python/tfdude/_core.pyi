@@ -81,7 +81,12 @@ class Transform:
     def with_covariance(self, covariance: _Covariance) -> Transform: ...
 
     def transform_cloud(
-        self, points: npt.ArrayLike, *, covariance: bool = False, own: npt.ArrayLike | None = None
+        self,
+        points: npt.ArrayLike,
+        *,
+        covariance: bool = False,
+        own: npt.ArrayLike | None = None,
+        out: Cloud | None = None,
     ) -> Cloud: ...
 
 class Cloud:
