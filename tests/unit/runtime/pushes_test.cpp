@@ -75,7 +75,7 @@ TEST_CASE("pushes: one watcher cannot begin groups without end, others still can
   const auto start = Pushes::Clock::now();
   for (std::uint64_t group = 1; group <= 1000; ++group) {
     const auto watched = owner.pusher.watch(group, {{kHand}}, greedy);
-    begun += watched ? 1 : 0;
+    begun += watched ? 1U : 0U;
     if (!watched) why = watched.error().message;
     if (!watched) CHECK(watched.error().code == Errc::kTooMuch);
   }
