@@ -113,7 +113,7 @@ class MemoryReads {
   std::atomic<bool> other_clocks_{false};
   mutable Mutex mutex_{LockRank::kParts};
   std::map<Owner, Known> owners_ TFDUDE_GUARDED_BY(mutex_);
-  Mutex offer_mutex_;
+  Mutex offer_mutex_{LockRank::kParts};
   std::optional<MemoryOffer> offer_ TFDUDE_GUARDED_BY(offer_mutex_);
   Mutex attaching_{LockRank::kSending};  // one owner after the other
   Loop::Job job_;                        // last: it uses the other members

@@ -89,6 +89,7 @@ TEST_CASE("faults: a longer lease in the profile delays the loss of a daemon") {
   const testing::TemporaryDirectory directory;
   Options options = domain.options();
   options.profile = directory.write("two_seconds.xml", text);
+  options.shared_memory = false;  // through which the death would be known at once
   Process arms = domain.start_daemon({"--config", kArmsFile, "--profile", options.profile});
   testing::await_ready(arms);
   auto client = Client::open(options).value();
