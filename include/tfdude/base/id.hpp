@@ -19,8 +19,9 @@ inline constexpr std::size_t kMaxIdBytes = 255;
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_id(std::string_view id, std::string_view what);
 
 /// Checks the id of a new frame, or the name of a new joint or source. As check_id(), and it must
-/// not look like another one: no space at its begin or end, and no character that cannot be seen or
-/// looks like a space (no-break space, zero-width space and so on). Spaces within it are allowed.
+/// not look like another one, or like an option: no space at its begin or end, no '-' at its begin,
+/// and no character that cannot be seen or looks like a space (no-break space, zero-width space and
+/// so on). Spaces within it are allowed.
 [[nodiscard]] TFDUDE_EXPORT Result<void> check_new_id(std::string_view id, std::string_view what);
 
 /// Checks a partition name: an id without the wildcards `*?[]` and without a comma, since the name
