@@ -12,8 +12,7 @@ AddCommand add_add, add_children, add_correlate, add_description, add_doctor, ad
     add_exists, add_forget, add_frames, add_fuse, add_graph, add_history, add_info, add_joint,
     add_joints, add_keys, add_lookup, add_monitor, add_move, add_observe, add_parent,
     add_partitions, add_plot, add_point, add_publish, add_record, add_remove, add_replay, add_roots,
-    add_tree, add_update, add_velocity, add_watch, add_web,
-    add_why;
+    add_tree, add_update, add_velocity, add_watch, add_web, add_why;
 
 Commands::Commands(CLI::App& app) : app_(app) {
   const std::pair<const char*, std::vector<AddCommand*>> groups[] = {

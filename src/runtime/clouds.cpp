@@ -5,9 +5,9 @@
 
 #include "tfdude/math/point.hpp"
 
-#include "types/trajectory_builder.hpp"
 #include "math/cloud_map.hpp"
 #include "runtime/many_lookups.hpp"
+#include "types/trajectory_builder.hpp"
 
 // Clouds of points: which transforms they need, and the points themselves.
 namespace tfdude {
