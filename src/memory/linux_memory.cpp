@@ -43,7 +43,7 @@ constexpr std::chrono::milliseconds kRest{100};
 // How long a reader waits for the owner's answer.
 constexpr std::chrono::milliseconds kAnswerIn{200};
 // Larger than any owner may reserve.
-constexpr std::size_t kMostBytes = std::size_t{1} << 40U;
+constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 40U;
 
 tl::unexpected<Error> unsupported(std::string why) {
   return fail(Errc::kUnsupported, std::move(why));
@@ -226,7 +226,7 @@ Result<MappedMemory> LinuxMemory::attach(const MemoryOffer& offer, std::uint64_t
   const int seals = fcntl(fd.get(), F_GET_SEALS);
   const bool fixed = seals >= 0 && (seals & F_SEAL_SHRINK) != 0;
   if (!fixed || fstat(fd.get(), &status) != 0 || status.st_size <= 0 ||
-      static_cast<std::size_t>(status.st_size) > kMostBytes) {
+      static_cast<std::uint64_t>(status.st_size) > kMostBytes) {
     return unsupported("its memory may shrink");
   }
   const auto size = static_cast<std::size_t>(status.st_size);

@@ -92,7 +92,7 @@ class Lookups final : private LookupHost {
   }
   [[nodiscard]] std::optional<Time> clock() const override { return structure_.clock.now(); }
 
-  /// What `look` finds in the memory of this process and, if any is attached, in that of others. The
+  /// What `look` finds in the memory of this process and, if any is attached, of others. The
   /// error is the forest's.
   template <class Look>
   [[nodiscard]] auto here(Look look) -> decltype(look(std::declval<const Forest&>())) {

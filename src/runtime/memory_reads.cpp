@@ -132,7 +132,7 @@ void MemoryReads::attach(Owner owner) {
   edges_.attach(owner, *forest, std::move(memory->at));
   note(owner, Known{Known::State::kAttached, incarnation, {}, Clock::now()});
   if (over->load()) end(owner, incarnation, false);
-  // It may have been lost meanwhile.
+  // The owner may have been lost meanwhile.
   look_again();
 }
 

@@ -1,14 +1,15 @@
 #include "runtime/process_memory.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 namespace tfdude {
 namespace {
 
 // Addresses, of which only those take memory that are used: more than the largest partition has.
-constexpr std::size_t kReserved =
-    sizeof(void*) == 8 ? std::size_t{8} << 30U : std::size_t{256} << 20U;
+constexpr auto kReserved =
+    static_cast<std::size_t>(std::uint64_t{sizeof(void*) == 8 ? 8192 : 256} << 20U);
 
 }  // namespace
 

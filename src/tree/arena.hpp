@@ -56,7 +56,7 @@ class Arena {
   /// Bytes of the given memory that were ever allocated.
   [[nodiscard]] std::size_t used() const { return used_; }
 
-  /// A block that was released is used again when no reader here can see it any more (epoch.hpp), as
+  /// A block that was released is used again if no reader here can see it any more (epoch.hpp), as
   /// the caller must have checked, and after the horizon tells the others.
   /// @param align  at most 64
   [[nodiscard]] void* allocate(std::size_t bytes, std::size_t align = alignof(std::max_align_t));

@@ -139,7 +139,6 @@ std::string_view RemoteForest::text_of(const Name* theirs) const {
   const Name* name = here(theirs);
   if (name == nullptr) return {};
   std::string_view text;
-  static_assert(sizeof(text) == 16);
   std::memcpy(&text, &name->text, sizeof(text));
   if (text.size() > kMostText) return {};
   const char* bytes = here(text.data(), text.size());

@@ -1,5 +1,5 @@
-// Changes words in the memory of an owner, before or after a reader has bound its edges: whatever it
-// contains, lookups end, stay in the memory, and return what is finite.
+// Changes words in the memory of an owner, before or after a reader has bound its edges. Whatever
+// it contains, lookups end, stay in the memory, and return what is finite.
 
 #include <cstdint>
 #include <cstring>
