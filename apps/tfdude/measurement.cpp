@@ -29,12 +29,10 @@ nlohmann::json json_of(const Observed& observed) {
   const auto finite = [](double value) {
     return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
   };
-  nlohmann::json json{{"accepted", observed.accepted},
-                      {"distance_squared", finite(observed.distance_squared)},
-                      {"dimensions", observed.dimensions},
-                      {"limit", finite(observed.limit)},
-                      {"corrected", observed.corrected},
-                      {"forgotten", observed.forgotten}};
+  nlohmann::json json{
+      {"accepted", observed.accepted},     {"distance_squared", finite(observed.distance_squared)},
+      {"dimensions", observed.dimensions}, {"limit", finite(observed.limit)},
+      {"corrected", observed.corrected},   {"forgotten", observed.forgotten}};
   add_stamp(json, observed.stamp);
   return json;
 }

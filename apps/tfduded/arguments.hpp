@@ -17,7 +17,7 @@ struct Arguments {
   std::vector<UrdfPart> urdfs;
   /// Of their edges that have none, instead of that of the configuration.
   std::optional<StatedCovariance> covariance;
-  bool check = false;  ///< only print what the configuration would change
+  bool check = false;         ///< only print what the configuration would change
   bool drop_damaged = false;  ///< leave out stored rows whose checksum is wrong
   std::optional<ClockKind> clock;
   Options options;

@@ -25,8 +25,7 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
   CREATE TABLE joint_types(name TEXT PRIMARY KEY, type INTEGER NOT NULL) WITHOUT ROWID;
   CREATE TABLE absent(partition TEXT PRIMARY KEY, since INTEGER NOT NULL, kind INTEGER NOT NULL,
                       incarnation INTEGER NOT NULL) WITHOUT ROWID;
-)",
-                                                    "",
+)", "",
                                                     R"(
   CREATE TABLE samples(id TEXT PRIMARY KEY, stamp INTEGER NOT NULL) WITHOUT ROWID;
 )",
