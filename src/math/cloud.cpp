@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "math/cloud_map.hpp"
+#include "math/processor.hpp"
 
 namespace tfdude {
 namespace {
@@ -16,16 +17,13 @@ namespace any {
 #include "math/cloud_body.ipp"
 }  // namespace any
 
-// As in kernel.cpp.
-#if defined(__x86_64__) && !defined(__clang__)
-#define TFDUDE_HAS_AVX2
+#if defined(TFDUDE_HAS_AVX2)
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
 #include "math/cloud_body.ipp"  // NOLINT(readability-duplicate-include): for another processor
 }  // namespace avx2
 #pragma GCC pop_options
-const bool kAvx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
 #endif
 
 template <class Number, int kRows>

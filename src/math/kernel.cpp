@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "math/processor.hpp"
 #include "math/small_angle.hpp"
 
 namespace tfdude::kernel {
@@ -14,9 +15,7 @@ namespace any {
 #include "math/kernel_body.ipp"
 }  // namespace any
 
-// clang, used only for checks, needs another pragma for this.
-#if defined(__x86_64__) && !defined(__clang__)
-#define TFDUDE_HAS_AVX2
+#if defined(TFDUDE_HAS_AVX2)
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2 {
@@ -27,7 +26,6 @@ namespace avx2 {
 const Functions kForAvx2{avx2::climb_poses, avx2::climb_both, avx2::join_poses,
                          avx2::join_both,   avx2::transport,  avx2::add_columns,
                          avx2::blend_poses, avx2::blend_both, avx2::add_fourth};
-const bool kAvx2 = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
 #endif
 
 }  // namespace
