@@ -157,8 +157,7 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
   const std::string source = source_ + "." + std::to_string(attempts_);
-  beside_others_ = !absent_.empty() || !path.lacking.empty();
-  const auto found = (beside_others_ ? observe_beside_others : tfdude::observe)(
+  const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
       path.edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);
   return fail_at("the path from " + quote(measurement_.a) + " to " + quote(measurement_.b),

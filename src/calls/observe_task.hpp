@@ -42,7 +42,7 @@ class ObserveTask final : public Task {
   [[nodiscard]] Observed& observed() { return observed_; }
   /// Whether it could not wait for another observation, or correct all edges beside the path: the
   /// result is right, but less certain than both together allow (observe_beside_others()).
-  [[nodiscard]] bool beside_others() const { return beside_others_; }
+  [[nodiscard]] bool beside_others() const { return !absent_.empty() || !path_.lacking.empty(); }
 
  private:
   enum class Stage {
@@ -82,7 +82,6 @@ class ObserveTask final : public Task {
   std::size_t owners_ = 0;           // that have a share
   Error refused_{};                  // why another one has not
   std::vector<std::string> absent_;  // edges beside the path that are left out, but still exist
-  bool beside_others_ = false;
   Observed observed_;
   int attempts_ = 0;
   int torn_ = 0;
