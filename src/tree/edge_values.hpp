@@ -171,8 +171,22 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   const Sample& after = *found.after;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
   if constexpr (!Edge::kRemote) {
+    moment.correlated = moment.correlated || is_correlated(before) || is_correlated(after);
+    const EdgeTiming& timing = from.version->samples->timing();
+    if constexpr (!std::is_same_v<Value, Pose>) {
+      auto value = timing.drifts ? drifted_between(before, after, s, said_of(*from.version),
+                                                   timing.process_noise, s * span * 1e-9)
+                                 : std::nullopt;
+      if (value) {
+        if (noisy) add_noise(value->X_PC, samples, seconds(moment.age));
+        correlate_next(path, &value->correlation);
+        Transform& X = path.place();
+        X = value->X_PC;
+        path.up(X);
+        return {};
+      }
+    }
     if (is_correlated(before) || is_correlated(after)) {
-      moment.correlated = true;
       if constexpr (std::is_same_v<Value, Belief>) {
         CorrelatedValue value = interpolate_observed(before, after, s, said_of(*from.version));
         if (noisy) add_noise(value.X_PC, samples, noise);

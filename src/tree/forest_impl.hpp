@@ -168,7 +168,8 @@ class Forest::Impl {
     return observed ? tfdude::whole(edge.X_PC, correlation->now, &correlation->said) : edge.X_PC;
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
-  /// Replaces the dynamic edge's sample with that stamp, if there is one.
+  /// Replaces the dynamic edge's sample with that stamp, or inserts it. The value is taken as it
+  /// is: the error of an edge that drifts is in it already.
   void replace_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
 

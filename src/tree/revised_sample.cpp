@@ -88,6 +88,26 @@ CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pos
   return found;
 }
 
+std::optional<CorrelatedValue> drifted_between(const Sample& before, const Sample& after, double s,
+                                               const Correlation* said, const Covariance& density,
+                                               double seconds) {
+  const auto has_source = [](const Correlation* correlation, const std::string& source) {
+    if (correlation == nullptr) return false;
+    const auto& all = correlation->common_errors;
+    return std::any_of(all.begin(), all.end(),
+                       [&](const CommonError& one) { return one.source == source; });
+  };
+  const Correlation* first = correlation_at(before, said);
+  if (const Correlation* second = correlation_at(after, said)) {
+    for (const CommonError& one : second->common_errors) {
+      if (!has_source(first, one.source)) return std::nullopt;
+    }
+  }
+  Pose G_PC;
+  interpolate(given(before).pose, given(after).pose, s, G_PC);
+  return drifted(before, said, G_PC, density, seconds);
+}
+
 Transform given(const Sample& sample) {
   const SampleRevision* revision = sample.revision();
   return revision != nullptr ? revision->given : sample.value();

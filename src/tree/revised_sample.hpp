@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "tfdude/types/correlation.hpp"
 
 #include "tree/sample.hpp"
@@ -25,6 +27,16 @@ struct CorrelatedValue {
 /// @param seconds  from the other to this one; not negative
 [[nodiscard]] CorrelatedValue drifted(const Sample& before, const Correlation* said,
                                       const Pose& G_PC, const Covariance& density, double seconds);
+
+/// The value of an edge that drifts, between two samples: that of the first one, and what the drift
+/// has added since. Nothing if an observation has corrected the second sample, but not the first:
+/// then interpolate_observed() has a bound.
+/// @param seconds  from the first to the instant
+[[nodiscard]] std::optional<CorrelatedValue> drifted_between(const Sample& before,
+                                                             const Sample& after, double s,
+                                                             const Correlation* said,
+                                                             const Covariance& density,
+                                                             double seconds);
 
 /// Of a sample, as it was before all observations.
 [[nodiscard]] Transform given(const Sample& sample);

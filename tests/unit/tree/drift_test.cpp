@@ -21,11 +21,12 @@ constexpr double kStep = 0.1;  // [s]
 
 Time at(int step) { return Time(std::chrono::milliseconds(100 * step)); }
 
-Query when(int step) {
+Query when(Time stamp) {
   Query query;
-  query.at = at(step);
+  query.at = stamp;
   return query;
 }
+Query when(int step) { return when(at(step)); }
 
 Pose shift(double x) { return Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}); }
 
@@ -49,8 +50,11 @@ struct Drifting {
 
   // As an observer does.
   Result<void> see(const Transform& Z, int step, const std::string& source) {
+    return see(Z, at(step), source);
+  }
+  Result<void> see(const Transform& Z, Time stamp, const std::string& source) {
     const auto seen =
-        forest.lookup_segments({{"world", "base"}, {"world", "object"}}, when(step), {}, true);
+        forest.lookup_segments({{"world", "base"}, {"world", "object"}}, when(stamp), {}, true);
     if (!seen) return tl::unexpected(seen.error());
     std::vector<ObservedEdge> edges;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -65,7 +69,7 @@ struct Drifting {
       revisions.push_back(
           {i == 0 ? "base" : "object", {X.pose, X.own}, {false, X.common_errors, {}}});
     }
-    return forest.revise(revisions, at(step), seen->commit);
+    return forest.revise(revisions, stamp, seen->commit);
   }
 
   [[nodiscard]] double sigma(const std::string& a, const std::string& b, int step) const {
@@ -85,7 +89,7 @@ struct Filter {
   double object = 1;
   double both = 0;
 
-  void drive() { base += 0.02 * 0.02 * kStep; }
+  void drive(double steps = 1) { base += 0.02 * 0.02 * steps * kStep; }
   void see(double variance) {
     const double S = base + object - 2 * both + variance;
     const double k_base = (both - base) / S;
@@ -144,6 +148,42 @@ TEST_CASE("drift: a correction of the past is that of all later values") {
   const auto next = robot.forest.lookup("world", "base", when(11));
   REQUIRE(next);
   CHECK(next->pose.translation().x() - later->pose.translation().x() == Approx(0.2));
+}
+
+// A camera's stamps are rarely those of the odometry.
+TEST_CASE("drift: what is seen between two samples corrects all later ones") {
+  Drifting robot;
+  Filter filter;
+  const Covariance R = of_deviations(0.005, 1);  // translation only, so that one axis suffices
+  robot.drive(0);
+  const auto is_close = [](double found, double expected) {
+    CHECK(found > 0.998 * expected);
+    CHECK(found < 1.01 * expected);
+  };
+  for (int step = 1; step <= 30; ++step) {
+    INFO("step " << step);
+    robot.drive(step);
+    const Time seen = at(step) - std::chrono::milliseconds(70);
+    const auto X = robot.forest.lookup("base", "object", when(seen));
+    REQUIRE(X);
+    const Pose Z = step == 1 ? shift(0.4) : X->pose;
+    REQUIRE(robot.see({Z, R}, seen, "observed:" + std::to_string(step)));
+    filter.drive(0.3);
+    filter.see(0.005 * 0.005);
+    const auto corrected = robot.forest.lookup("world", "base", when(seen));
+    const auto later = robot.forest.lookup("world", "base", when(step));
+    REQUIRE(corrected);
+    REQUIRE(later);
+    CHECK((later->pose.translation() - corrected->pose.translation()).norm() < 1e-9);
+    is_close(std::sqrt(robot.forest.lookup("base", "object", when(seen))
+                           ->covariance.of_specified()
+                           .upper()[0]),
+             filter.between());
+    filter.drive(0.7);
+    is_close(robot.sigma("world", "base", step), std::sqrt(filter.base));
+    is_close(robot.sigma("world", "object", step), std::sqrt(filter.object));
+    is_close(robot.sigma("base", "object", step), filter.between());
+  }
 }
 
 TEST_CASE("drift: the object in the map and in the base is as certain as is right in 200 runs") {
