@@ -6,6 +6,8 @@
 
 #include "tfdude/math/perturbation.hpp"
 
+#include "math/drift.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -40,25 +42,33 @@ struct Shared {
   std::string name;
   Loading before = Loading(6, 0);
   Loading after = Loading(6, 0);
-  bool fixed = true;  // all of these edges are
+  bool lasts = true;  // it is the same error at both ends
 };
+
+// How the error at the end follows from that at the beginning, if it does.
+std::optional<Drift> drift_of(const EdgeAtEnds& edge) {
+  if (edge.fixed) return Drift{};
+  return edge.drifts ? drift_between(edge.before, edge.after) : std::nullopt;
+}
 
 class Sum {
  public:
   void add(const EdgeAtEnds& edge, const Gains& gains) {
-    add_own(edge, gains);
+    const std::optional<Drift> drift = drift_of(edge);
+    const bool lasts = drift.has_value();
+    total_ += of_ends(drift, gains, edge.before.own, edge.after.own);
     add_unknown(edge, gains);
     for (const CommonError& one : edge.before.common_errors) {
-      if (!one.subtracts) add_columns(shared(one, edge).before, gains.before * one.loading);
+      if (!one.subtracts) add_columns(shared(one, lasts).before, gains.before * one.loading);
     }
     for (const CommonError& one : edge.after.common_errors) {
-      if (!one.subtracts) add_columns(shared(one, edge).after, gains.after * one.loading);
+      if (!one.subtracts) add_columns(shared(one, lasts).after, gains.after * one.loading);
     }
   }
 
   void finish(MeanVelocity& velocity) {
     for (Shared& source : shared_) {
-      if (source.fixed) {
+      if (source.lasts) {
         Loading difference = -source.before;
         add_columns(difference, source.after);
         total_ += squared(difference);
@@ -73,33 +83,34 @@ class Sum {
   }
 
  private:
-  [[nodiscard]] Covariance of_ends(const EdgeAtEnds& edge, const Gains& gains,
+  [[nodiscard]] Covariance of_ends(const std::optional<Drift>& drift, const Gains& gains,
                                    const Covariance& before, const Covariance& after) {
-    if (edge.fixed) return mapped(gains.after - gains.before, after);
+    if (drift) {
+      Covariance share = mapped(gains.after * drift->F - gains.before, before);
+      share += mapped(gains.after, drift->added);
+      return share;
+    }
     if (!is_zero(before) || !is_zero(after)) bound_ = true;
     return bound(mapped(gains.before, before), mapped(gains.after, after));
   }
 
-  void add_own(const EdgeAtEnds& edge, const Gains& gains) {
-    total_ += of_ends(edge, gains, edge.before.own, edge.after.own);
-  }
-
   void add_unknown(const EdgeAtEnds& edge, const Gains& gains) {
     if (!edge.before.unknown && !edge.after.unknown) return;
-    const Covariance share = of_ends(edge, gains, edge.before.unknown.value_or(Covariance()),
+    const Covariance share = of_ends(edge.fixed ? drift_of(edge) : std::nullopt, gains,
+                                     edge.before.unknown.value_or(Covariance()),
                                      edge.after.unknown.value_or(Covariance()));
     unknown_ = unknown_ ? bound(*unknown_, share) : share;
     bound_ = true;
   }
 
-  Shared& shared(const CommonError& common_error, const EdgeAtEnds& edge) {
+  Shared& shared(const CommonError& common_error, bool lasts) {
     auto found = std::find_if(shared_.begin(), shared_.end(),
                               [&](const Shared& one) { return one.name == common_error.source; });
     if (found == shared_.end()) {
       shared_.push_back({common_error.source});
       found = std::prev(shared_.end());
     }
-    found->fixed = found->fixed && edge.fixed;
+    found->lasts = found->lasts && lasts;
     return *found;
   }
 

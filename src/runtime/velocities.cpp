@@ -25,22 +25,8 @@ std::vector<Part> parts_at(const std::vector<Part>& parts, Time at) {
   return then;
 }
 
-// A static edge is the same at both instants, but a dynamic one may also be.
-bool is_same(const Belief& a, const Belief& b) {
-  const auto upper = [](const std::optional<Covariance>& sigma) {
-    return sigma ? sigma->upper() : Covariance::Upper{};
-  };
-  return a.pose.matrix() == b.pose.matrix() && a.own.upper() == b.own.upper() &&
-         a.unknown.has_value() == b.unknown.has_value() && upper(a.unknown) == upper(b.unknown) &&
-         a.common_errors == b.common_errors && a.unspecified == b.unspecified;
-}
-
-bool is_static(const std::vector<HistoryInfo>& histories) {
-  return std::none_of(histories.begin(), histories.end(),
-                      [](const HistoryInfo& history) { return history.newest.has_value(); });
-}
-
-// Asks for the edges of a path at both ends of an interval, then which of them are static.
+// Asks for the edges of a path at both ends of an interval. The answers tell which of them are
+// dynamic.
 class EdgesTask final : public Task {
  public:
   EdgesTask(const Forest& forest, std::string a, std::string b, Time begin, Time end)
@@ -59,15 +45,6 @@ class EdgesTask final : public Task {
   }
   [[nodiscard]] std::vector<Part>& parts() override { return parts_; }
   [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point) override {
-    return edges_.empty() ? take_values(std::move(replies)) : take_histories(replies);
-  }
-
-  /// Once it is done.
-  [[nodiscard]] const std::vector<EdgeAtEnds>& edges() const { return edges_; }
-  [[nodiscard]] const ObservePlan& planned() const { return plan_; }
-
- private:
-  [[nodiscard]] Result<Next> take_values(std::vector<Reply> replies) {
     auto answers = values_of(std::move(replies));
     if (!answers) return tl::unexpected(std::move(answers.error()));
     const auto middle = answers->begin() + static_cast<std::ptrdiff_t>(plan_.parts.size());
@@ -76,34 +53,22 @@ class EdgesTask final : public Task {
     const auto after = observed_path(plan_, {middle, answers->end()});
     if (!after) return tl::unexpected(after.error());
     for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
-      edges_.push_back({before->edges[k].X_PC, after->edges[k].X_PC, plan_.edges[k].way});
-    }
-    ask_for_histories();
-    return parts_.empty() ? Next::kDone : Next::kAsk;
-  }
-
-  void ask_for_histories() {
-    parts_.clear();
-    same_.clear();
-    for (std::size_t k = 0; k < edges_.size(); ++k) {
-      if (!is_same(edges_[k].before, edges_[k].after)) continue;
-      const FrameInfo& edge = plan_.edges[k].info;
-      const auto owner = std::find_if(plan_.parts.begin(), plan_.parts.end(),
-                                      [&](const Part& part) { return part.owner == edge.owner; });
-      same_.push_back(k);
-      parts_.push_back({edge.owner, owner->partition, Request{0, edge.id, HistoryRequest{}}});
-    }
-  }
-
-  [[nodiscard]] Result<Next> take_histories(const std::vector<Reply>& replies) {
-    for (std::size_t i = 0; i < same_.size(); ++i) {
-      if (const auto* error = std::get_if<Error>(&replies[i].body)) return tl::unexpected(*error);
-      const auto* histories = std::get_if<std::vector<HistoryInfo>>(&replies[i].body);
-      edges_[same_[i]].fixed = histories != nullptr && is_static(*histories);
+      const std::string& id = plan_.edges[k].info.id;
+      const bool moves =
+          is_moving(id, before->correlations[k]) || is_moving(id, after->correlations[k]);
+      const bool drifts =
+          is_drifting(id, before->correlations[k]) && is_drifting(id, after->correlations[k]);
+      edges_.push_back(
+          {before->edges[k].X_PC, after->edges[k].X_PC, plan_.edges[k].way, !moves, drifts});
     }
     return Next::kDone;
   }
 
+  /// Once it is done.
+  [[nodiscard]] const std::vector<EdgeAtEnds>& edges() const { return edges_; }
+  [[nodiscard]] const ObservePlan& planned() const { return plan_; }
+
+ private:
   const Forest& forest_;
   const std::string a_;
   const std::string b_;
@@ -112,7 +77,6 @@ class EdgesTask final : public Task {
   ObservePlan plan_;
   std::vector<Part> parts_;
   std::vector<EdgeAtEnds> edges_;
-  std::vector<std::size_t> same_;  // edges with equal values at both ends
 };
 
 }  // namespace

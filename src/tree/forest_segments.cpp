@@ -207,7 +207,8 @@ const Correlation* row_at(const HeldVersion& edge, std::int64_t t) {
 }
 
 // Adds the edges that each single edge was observed with. A dynamic edge is listed with itself
-// twice: what was observed is its sample, and a later one has another error.
+// twice: what was observed is its sample, and a later one has another error. One that drifts is
+// listed three times: its later error follows from the earlier one.
 void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
@@ -219,7 +220,7 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
       auto& with = found.correlations[i].observed_with;
-      with.assign(2, std::string(edge->name->text));
+      with.assign(edge->samples->timing().drifts ? 3 : 2, std::string(edge->name->text));
       const Correlation* row = found.stamp ? row_at(*edge, nanoseconds(*found.stamp)) : nullptr;
       if (row == nullptr) continue;
       std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),

@@ -16,6 +16,7 @@ struct EdgeFromFixed {
   Belief X_PC;
   bool up = false;  ///< the path goes from the child to the parent
   bool moving = false;
+  bool drifts = false;  ///< as EdgeTiming::drifts
 };
 
 /// Those of a path in one forest.
@@ -28,8 +29,9 @@ struct EdgeFromFixed {
 /// The pose of b in a, each at an instant of its own, from their poses in a fixed frame. The stamp
 /// is that of b; the unspecified edges are in the order of the path from a to b.
 ///
-/// A static edge on both paths has the same error twice. That of a dynamic one at two instants may
-/// be correlated in any way: the covariance is an upper bound.
+/// A static edge on both paths has the same error twice; that of one that drifts follows from the
+/// earlier one (drift_between()). The errors of another dynamic edge at two instants may be
+/// correlated in any way: the covariance is an upper bound.
 /// @param to_a, to_b  may be empty if no edge is on both paths
 [[nodiscard]] StampedTransform over_fixed(const StampedTransform& X_FA,
                                           const StampedTransform& X_FB,

@@ -26,7 +26,7 @@ struct PathCorrelation {
   std::optional<Covariance> unknown;
   std::vector<CommonError> common_errors;
   /// Of a single edge, as in Correlation; otherwise empty. For a lookup of edges, a dynamic edge is
-  /// listed with itself twice, before those.
+  /// listed with itself twice, before those, and one that drifts three times.
   std::vector<std::string> observed_with;
 
   [[nodiscard]] bool empty() const {
@@ -38,6 +38,12 @@ struct PathCorrelation {
 [[nodiscard]] inline bool is_moving(const std::string& id, const PathCorrelation& correlation) {
   const auto& with = correlation.observed_with;
   return with.size() >= 2 && with[0] == id && with[1] == id;
+}
+
+/// Whether a dynamic edge drifts, as a lookup of edges says.
+[[nodiscard]] inline bool is_drifting(const std::string& id, const PathCorrelation& correlation) {
+  return is_moving(id, correlation) && correlation.observed_with.size() >= 3 &&
+         correlation.observed_with[2] == id;
 }
 
 [[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);

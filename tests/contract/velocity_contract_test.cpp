@@ -25,6 +25,12 @@ using testing::outcome;
 
 Time ms(std::int64_t milliseconds) { return Time(Milliseconds(milliseconds)); }
 
+Query when(std::int64_t milliseconds) {
+  Query query;
+  query.at = ms(milliseconds);
+  return query;
+}
+
 Covariance isotropic(double metres, double radians) {
   return *Covariance::from_stddev({metres, metres, metres, radians, radians, radians});
 }
@@ -138,6 +144,38 @@ TEST_CASE("velocity: common errors of static edges cancel, and those of dynamic 
     REQUIRE(velocity);
     CHECK(velocity->linear.norm() < 1e-12);
     CHECK(velocity->covariance.if_complete()->stddev()[0] == Approx(2 * 0.01 / 0.1));
+  }
+}
+
+// 2 cm per √s, straight on along x at 1 m/s, after a start that is known to 10 cm.
+TEST_CASE("velocity: of an edge that drifts, and over it at two instants, by its model") {
+  const Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  EdgeTiming drifting;
+  drifting.drifts = true;
+  drifting.process_noise = isotropic(0.02, 0.001);
+  FrameSpec base{"base", "world", {}};
+  base.timing = drifting;
+  auto node = Node::open(join("base"), "base", {{"world", "", {}}, base}).value();
+  auto client = Client::open(join("")).value();
+  for (int t = 1000; t <= 2000; t += 100) {
+    REQUIRE(node.update("base", {along_x(1e-3 * t).pose, isotropic(0.1, 0.1)}, ms(t)));
+  }
+  for (Client* caller : {&client, static_cast<Client*>(&node)}) {
+    const auto velocity = caller->velocity("world", "base", {ms(1500), 200ms});
+    REQUIRE(velocity);
+    const auto* sigma = velocity->covariance.if_complete();
+    REQUIRE(sigma != nullptr);
+    CHECK(velocity->linear.x() == Approx(1.0));
+    CHECK(sigma->stddev()[0] == Approx(0.02 * std::sqrt(0.2) / 0.2));
+    CHECK_FALSE(velocity->basis.bound);
+    for (const auto& [from, to] : {std::pair(1200, 1450), std::pair(1450, 1200)}) {
+      const auto moved = caller->lookup("base", when(from), "base", when(to), "world");
+      REQUIRE(moved);
+      CHECK_FALSE(moved->basis.bound);
+      CHECK(moved->pose.translation().x() == Approx(1e-3 * (to - from)));
+      CHECK(moved->covariance.if_complete()->stddev()[0] ==
+            Approx(0.02 * std::sqrt(0.25)).epsilon(1e-3));
+    }
   }
 }
 

@@ -233,8 +233,9 @@ class TFDUDE_EXPORT Client {
                                                 const Query& query, Milliseconds wait);
 
   /// Frame b at one instant seen from frame a at another, through a frame that is assumed fixed in
-  /// between: X_AF(at_a) X_FB(at_b). A static edge on both ways has the same error twice. If a
-  /// dynamic one is, its errors may be correlated in any way, and the covariance is an upper bound.
+  /// between: X_AF(at_a) X_FB(at_b). A static edge on both ways has the same error twice, and
+  /// that of one that drifts goes on. If another dynamic edge is on both, its errors may be
+  /// correlated in any way, and the covariance is an upper bound.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, const Query& at_a,
                                                 std::string_view b, const Query& at_b,
                                                 std::string_view fixed, Milliseconds wait = {});

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/math/perturbation.hpp"
+
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/sampling.hpp"
@@ -207,6 +209,43 @@ TEST_CASE("mean velocity: the bound is reached when the ends are opposed") {
     return {{xi, -xi}};
   });
   CHECK(testing::moment_diff(S, sigma, kSamples, 0.01) == "");
+}
+
+TEST_CASE("mean velocity: the error of an edge that drifts goes on, and grows") {
+  Random random(706);
+  INFO("seed " << random.seed());
+  const Pose X0 = swing(0.2);
+  const Pose X1 = swing(0.5);
+  const Matrix6d carry = adjoint(X1.inverse() * X0);
+  const Loading loading = 1e-3 * Loading::Random(6, 2);
+  const Covariance own = random.covariance(1e-3, 1e-3);
+  const Covariance walk = random.covariance(1e-4, 1e-4);
+  EdgeAtEnds drifting = moving(X0, X1);
+  drifting.drifts = true;
+  drifting.before.own = own;
+  drifting.after.own =
+      Covariance::trusted(Matrix6d(carry * own.matrix() * carry.transpose() + walk.matrix()));
+  drifting.before.common_errors = {{"map", false, loading}};
+  drifting.after.common_errors = {{"map", false, carry * loading}};
+  std::vector<EdgeAtEnds> path{fixed({random.pose(), {}}, Way::kUp), drifting};
+  const MeanVelocity velocity = mean_velocity(path, 0.3);
+  CHECK_FALSE(velocity.bound);
+  const Gaussian of_own{Eigen::MatrixXd(own.matrix())};
+  const Gaussian of_walk{Eigen::MatrixXd(walk.matrix())};
+  const Matrix6d S = sampled(path, 0.3, [&]() -> std::vector<Errors> {
+    const Eigen::Vector2d source(random.normal(), random.normal());
+    const Twist before = of_own(random) + loading * source;
+    return {{Twist::Zero(), Twist::Zero()}, {before, carry * before + of_walk(random)}};
+  });
+  const Matrix6d sigma = velocity.covariance.matrix();
+  CHECK(testing::moment_diff(S, sigma, kSamples, 0.01) == "");
+  CHECK(testing::moment_diff(S, Matrix6d(1.2 * sigma), kSamples, 0.01) != "");
+  // An observation that has corrected the later value alone leaves nothing but a bound.
+  path[1].after.common_errors.push_back({"observed:1", true, 1e-4 * Loading::Random(6, 2)});
+  CHECK(mean_velocity(path, 0.3).bound);
+  path[1] = drifting;
+  path[1].after.own = {};
+  CHECK(mean_velocity(path, 0.3).bound);
 }
 
 TEST_CASE("mean velocity: shared sources and unknown correlation are covered, too") {

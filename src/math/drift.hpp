@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+
+#include "tfdude/math/belief.hpp"
+
+namespace tfdude {
+
+/// The errors e0, e1 of one edge at two instants, where e1 = F e0 + w, and w is independent of e0.
+struct Drift {
+  Matrix6d F = Matrix6d::Identity();
+  Covariance added;  ///< of w
+};
+
+/// Of an edge that drifts: it has moved from one value to the other as it was told (F is the
+/// adjoint of that motion's inverse), and w is what the drift has added.
+/// @return nothing if the later value does not follow from the earlier one, as an observation has
+///   corrected it alone
+[[nodiscard]] std::optional<Drift> drift_between(const Belief& earlier, const Belief& later);
+
+}  // namespace tfdude
