@@ -68,6 +68,7 @@ Loading root_of_difference(const Loading& C, const Loading& D) {
   const Eigen::MatrixXd taken = whole.whitening() * D;
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const auto rank = static_cast<Eigen::Index>(whole.rank());
+  if (rank == 0) return Loading(6, 0);  // Eigen decomposes no empty matrix
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> rest(Eigen::MatrixXd::Identity(rank, rank) -
                                                             taken * taken.transpose());
   return whole.root() * rest.eigenvectors() *

@@ -71,6 +71,21 @@ TEST_CASE("two instants: a static edge has one error, which cancels or doubles")
   CHECK_FALSE(robot.bound);
 }
 
+// What the observation has left cancels to nothing, from which nothing can be subtracted.
+TEST_CASE("two instants: an observed static edge has one error, too") {
+  Robot robot(Covariance(), Covariance(), of_deviations(0.01, 0.01));
+  const Transform Z{turned(0, 1), of_deviations(0.001, 0.001)};
+  const auto seen = robot.nodes[0].observe("map", "mount", Z, at(1).at);
+  REQUIRE(seen);
+  REQUIRE(seen->accepted);
+  const double left = 1 / (1 / (0.01 * 0.01) + 1 / (0.001 * 0.001));
+  const Twist straight = robot.variances("mount", 2, 3, "odom");
+  CHECK(std::abs(straight[0]) < 1e-15);
+  CHECK(straight[1] == Approx(left));  // of the yaw, 1 m on
+  CHECK(straight.tail<3>().cwiseAbs().maxCoeff() < 1e-15);
+  CHECK(robot.variances("mount", 1, 2, "odom")[0] == Approx(4 * left));
+}
+
 TEST_CASE("two instants: what is above the moving edges does not count") {
   Robot robot(of_deviations(1, 0.1), Covariance(), Covariance());
   CHECK(robot.variances("mount", 1, 3, "map").cwiseAbs().maxCoeff() < 1e-12);
