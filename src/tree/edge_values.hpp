@@ -100,6 +100,18 @@ struct Moment {
   bool correlated = false;  // a sample has a correlation of its own
 };
 
+// Accumulates a value that was computed, and has drifted for some time since.
+template <class Value, class Samples>
+Result<void> accumulate_correlated(PathAccumulation<Value>& path, const CorrelatedValue& value,
+                                   const Samples& samples, double seconds) {
+  correlate_next(path, &value.correlation);
+  Transform& X = path.place();
+  X = value.X_PC;
+  if (samples.has_noise()) add_noise(X, samples, seconds);
+  path.up(X);
+  return {};
+}
+
 // Accumulates an edge beyond its newest sample.
 template <class Value, class Edge>
 Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, Moment& moment) {
@@ -120,14 +132,9 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
   const double noise = beyond * s + seconds(moment.age);
   if constexpr (!std::is_same_v<Value, Pose> && !Edge::kRemote) {
     if (revised || said_of(edge) != nullptr) {
-      CorrelatedValue ahead = extrapolate_correlated(before, newest, edge.X_PC, s, said_of(edge),
-                                                     edge.samples->timing().drifts);
-      correlate_next(path, &ahead.correlation);
-      Transform& X = path.place();
-      X = ahead.X_PC;
-      add_noise(X, samples, noise);
-      path.up(X);
-      return {};
+      const CorrelatedValue ahead = extrapolate_correlated(
+          before, newest, edge.X_PC, s, said_of(edge), edge.samples->timing().drifts);
+      return accumulate_correlated(path, ahead, samples, noise);
     }
   }
   OfEdge<Value>& X = path.place();
@@ -171,28 +178,21 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   const Sample& after = *found.after;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
   if constexpr (!Edge::kRemote) {
-    moment.correlated = moment.correlated || is_correlated(before) || is_correlated(after);
-    const EdgeTiming& timing = from.version->samples->timing();
+    const bool correlated = is_correlated(before) || is_correlated(after);
+    moment.correlated = moment.correlated || correlated;
     if constexpr (!std::is_same_v<Value, Pose>) {
-      auto value = timing.drifts ? drifted_between(before, after, s, said_of(*from.version),
-                                                   timing.process_noise, s * span * 1e-9)
-                                 : std::nullopt;
-      if (value) {
-        if (noisy) add_noise(value->X_PC, samples, seconds(moment.age));
-        correlate_next(path, &value->correlation);
-        Transform& X = path.place();
-        X = value->X_PC;
-        path.up(X);
-        return {};
+      const EdgeTiming& timing = from.version->samples->timing();
+      const Correlation* said = said_of(*from.version);
+      if (timing.drifts) {
+        const double since = s * span * 1e-9;
+        const auto X = drifted_between(before, after, s, said, timing.process_noise, since);
+        if (X) return accumulate_correlated(path, *X, samples, seconds(moment.age));
       }
-    }
-    if (is_correlated(before) || is_correlated(after)) {
       if constexpr (std::is_same_v<Value, Belief>) {
-        CorrelatedValue value = interpolate_observed(before, after, s, said_of(*from.version));
-        if (noisy) add_noise(value.X_PC, samples, noise);
-        correlate_next(path, &value.correlation);
-        path.up(value.X_PC);
-        return {};
+        if (correlated) {
+          const CorrelatedValue X = interpolate_observed(before, after, s, said);
+          return accumulate_correlated(path, X, samples, noise);
+        }
       }
     }
     correlate_next(path, said_of(*from.version));

@@ -216,6 +216,22 @@ TEST_CASE("drift: the object in the map and in the base is as certain as is righ
   CHECK_CONSISTENT(in_base);
 }
 
+TEST_CASE("drift: between a sample and a corrected one there is a bound") {
+  Drifting robot;
+  for (int step = 0; step < 3; ++step) {
+    robot.G = robot.G * shift(0.3);
+    robot.drive(step);
+  }
+  REQUIRE(robot.see({robot.G.inverse(), of_deviations(0.01, 0.01)}, 2, "observed:1"));
+  const Time half = at(2) - std::chrono::milliseconds(50);
+  const auto X = robot.forest.lookup("world", "base", when(half));
+  REQUIRE(X);
+  CHECK(X->pose.translation().x() == Approx(0.75).epsilon(1e-3));
+  CHECK(X->covariance.complete());
+  const double before = robot.sigma("world", "base", 1);
+  CHECK(std::sqrt(X->covariance.of_specified().upper()[0]) > before);
+}
+
 TEST_CASE("drift: beyond the newest sample the error goes on from there") {
   Drifting robot;
   for (int step = 0; step < 3; ++step) {
