@@ -26,8 +26,15 @@ std::string to_blob(const Correlation& correlation) {
   return blob;
 }
 
-Result<Correlation> correlation_from(const std::string& blob) {
-  ByteReader in(blob);
+namespace {
+
+constexpr std::size_t kPoseBytes = 7 * sizeof(double);
+
+tl::unexpected<Error> bad_size(std::size_t size) {
+  return fail(Errc::kState, "a correlation of " + std::to_string(size) + " bytes");
+}
+
+Result<Correlation> read_correlation(ByteReader& in, std::size_t size) {
   bool valid = true;
   // No greater number is valid.
   const auto up_to = [&valid](std::size_t most, std::uint32_t number) {
@@ -46,15 +53,51 @@ Result<Correlation> correlation_from(const std::string& blob) {
   for (auto left = up_to(kMaxCommonErrors, in.u32()); left > 0; --left) {
     correlation.observed_with.emplace_back(in.text());
   }
-  if (!valid || !in.good() || in.left() > 0) {
-    return fail(Errc::kState, "a correlation of " + std::to_string(blob.size()) + " bytes");
-  }
+  if (!valid || !in.good()) return bad_size(size);
   if (auto ok = check_common_errors(correlation.common_errors); !ok)
     return tl::unexpected(std::move(ok.error()));
   for (const std::string& id : correlation.observed_with) {
     if (auto ok = check_id(id, "an edge observed with it"); !ok) return tl::unexpected(ok.error());
   }
   return correlation;
+}
+
+}  // namespace
+
+Result<Correlation> correlation_from(const std::string& blob) {
+  ByteReader in(blob);
+  auto correlation = read_correlation(in, blob.size());
+  if (correlation && in.left() > 0) return bad_size(blob.size());
+  return correlation;
+}
+
+std::string observed_blob(const StoredCorrelation& correlation) {
+  if (!correlation.observed) return {};
+  std::string blob = to_blob(*correlation.observed);
+  if (!correlation.given) return blob;
+  ByteWriter out(blob);
+  const Eigen::Quaterniond rotation = correlation.given->rotation();
+  const Eigen::Vector3d translation = correlation.given->translation();
+  for (const double number : rotation.coeffs()) out.f64(number);
+  for (const double number : translation) out.f64(number);
+  return blob;
+}
+
+Result<void> read_observed(const std::string& blob, StoredCorrelation& correlation) {
+  ByteReader in(blob);
+  auto observed = read_correlation(in, blob.size());
+  if (!observed) return tl::unexpected(std::move(observed.error()));
+  correlation.observed = *std::move(observed);
+  if (in.left() == 0) return {};
+  if (in.left() != kPoseBytes) return bad_size(blob.size());
+  Eigen::Quaterniond rotation;
+  Eigen::Vector3d translation;
+  for (double& number : rotation.coeffs()) number = in.f64();
+  for (double& number : translation) number = in.f64();
+  const auto given = Pose::create(rotation, translation);
+  if (!given) return fail_at("the pose as it was given", given.error());
+  correlation.given = *given;
+  return {};
 }
 
 }  // namespace tfdude

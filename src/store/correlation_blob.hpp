@@ -19,4 +19,11 @@ namespace tfdude {
 /// @return kState or kInvalidInput: cut short, or not a valid correlation.
 [[nodiscard]] Result<Correlation> correlation_from(const std::string& blob);
 
+/// As to_blob() of what observations have found. StoredCorrelation::given follows if there is one:
+/// the quaternion x, y, z, w, and the translation.
+[[nodiscard]] std::string observed_blob(const StoredCorrelation& correlation);
+
+/// Reads what observed_blob() has written.
+[[nodiscard]] Result<void> read_observed(const std::string& blob, StoredCorrelation& correlation);
+
 }  // namespace tfdude

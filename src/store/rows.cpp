@@ -62,9 +62,8 @@ Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row) 
   if (!said) return tl::unexpected(std::move(said.error()));
   StoredCorrelation correlation{*std::move(said), {}};
   if (const std::string bytes = row.bytes(2); !bytes.empty()) {
-    auto observed = correlation_from(bytes);
-    if (!observed) return fail_at("correlation of " + quote(row.text(0)), observed.error());
-    correlation.observed = *std::move(observed);
+    auto ok = read_observed(bytes, correlation);
+    if (!ok) return fail_at("correlation of " + quote(row.text(0)), ok.error());
   }
   return correlation;
 }

@@ -377,7 +377,7 @@ Result<void> SqliteStore::save_correlation(const std::string& id,
   auto done = erase_correlation_.run(id);
   if (done) done = sums_.erase("ties", id);
   if (!done || correlation.empty()) return done;
-  const Blob observed{correlation.observed ? to_blob(*correlation.observed) : std::string()};
+  const Blob observed{observed_blob(correlation)};
   done = put_correlation_.run(id, Blob{to_blob(correlation.said)}, observed);
   return done ? sums_.put("ties", id) : done;
 }

@@ -102,7 +102,7 @@ Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correl
                                       correlation.observed.has_value(), 0});
   }
   impl_->set_correlation(fresh, std::move(resumed));
-  if (time.cleared || time.stamp) impl_->resume_history(fresh, time);
+  if (time.cleared || time.stamp) impl_->resume_history(fresh, time, correlation.given);
   impl_->commit();
   return {};
 }
@@ -113,7 +113,13 @@ ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
   if (edge.moving() && !edge.lacks_sample()) kept.time.stamp = tfdude::time_of(edge.stamp);
   if (edge.correlation == nullptr) return kept;
   kept.correlation.said = edge.correlation->said;
-  if (edge.correlation->revised) kept.correlation.observed = edge.correlation->now;
+  if (!edge.correlation->revised) return kept;
+  kept.correlation.observed = edge.correlation->now;
+  if (!kept.time.stamp) return kept;
+  const Sample* newest = edge.samples->sample(edge.number);
+  if (newest != nullptr && newest->revision() != nullptr) {
+    kept.correlation.given = newest->revision()->given.pose;
+  }
   return kept;
 }
 
@@ -197,10 +203,12 @@ void Forest::Impl::show_revision(std::uint32_t slot) {
 }
 
 // The first value of a history says where the edge begins, with the covariance that is known of it.
+// An edge whose owner has restarted goes on from its stored sample.
 void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   const std::int64_t span = newest.samples->timing().span.count();
-  if (!newest.limits() || newest.left_behind() || stamp < newest.stamp - span) {
+  const bool begins = newest.left_behind() ? stamp < newest.stamp : stamp < newest.stamp - span;
+  if (!newest.limits() || begins) {
     Transform X_PC = value.X_PC;
     if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
     return push_checked(newest, {X_PC}, stamp);

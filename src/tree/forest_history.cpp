@@ -126,10 +126,14 @@ void Forest::Impl::await_sample(HeldVersion& fresh, std::int64_t stamp) {
   fresh.number = 0;
 }
 
-void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left) {
+void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
+                                  const std::optional<Pose>& given) {
   await_sample(fresh, left.cleared ? kNoSample : kUnsampled);
   if (left.cleared || !left.stamp) return;
-  append_to(fresh, {fresh.X_PC}, nanoseconds(*left.stamp));
+  const bool revised = given && fresh.correlation != nullptr && fresh.correlation->revised;
+  SampleRevision revision;
+  if (revised) revision = {{*given, {}}, fresh.correlation->now};
+  append_to(fresh, {fresh.X_PC, nullptr, revised ? &revision : nullptr}, nanoseconds(*left.stamp));
   fresh.samples->left_behind = true;
 }
 
@@ -166,14 +170,15 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   const HeldVersion& newest = impl_->frames_.newest_value(*slot);
-  const StoredTime left = Impl::kept(newest).time;
+  const ChangedEdge kept = Impl::kept(newest);
+  const StoredTime& left = kept.time;
   const bool resumes = newest.left_behind() || left.cleared;
   HeldVersion& fresh = impl_->push_held(*slot, newest.X_PC);
   impl_->forget_history(fresh);
   SampleHistory::destroy(fresh.samples);  // no reader has seen it
   fresh.samples = SampleHistory::create(*impl_->arena_, timing).release();
   if (resumes) {
-    impl_->resume_history(fresh, left);
+    impl_->resume_history(fresh, left, kept.correlation.given);
   } else if (timing.moving) {
     impl_->await_sample(fresh);
   }

@@ -113,7 +113,9 @@ class Forest::Impl {
   /// Makes the fresh version, which has no sample, dynamic.
   void await_sample(HeldVersion& fresh, std::int64_t stamp = kUnsampled) TFDUDE_REQUIRES(mutex_);
   /// Makes the value of the fresh version, which has no sample, what an earlier process has left.
-  void resume_history(HeldVersion& fresh, const StoredTime& left) TFDUDE_REQUIRES(mutex_);
+  /// @param given  as StoredCorrelation::given
+  void resume_history(HeldVersion& fresh, const StoredTime& left, const std::optional<Pose>& given)
+      TFDUDE_REQUIRES(mutex_);
   /// Retires a history with all its samples.
   void give_back(SampleHistory* samples) TFDUDE_REQUIRES(mutex_);
   /// A sample of the current commit for a place in a history; it shares with a neighbour there what

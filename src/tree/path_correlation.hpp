@@ -14,10 +14,17 @@ struct StoredCorrelation {
   Correlation said{};
   /// Replaces `said` until the edge's next value; set by observations.
   std::optional<Correlation> observed{};
+  /// The pose of the edge's newest sample as it was given, if an observation has corrected it: an
+  /// edge that drifts goes on from there.
+  std::optional<Pose> given{};
 
   [[nodiscard]] bool empty() const { return said.empty() && !observed; }
   friend bool operator==(const StoredCorrelation& a, const StoredCorrelation& b) {
-    return a.said == b.said && a.observed == b.observed;
+    const auto matrix = [](const StoredCorrelation& one) {
+      return one.given.value_or(Pose()).matrix();
+    };
+    return a.said == b.said && a.observed == b.observed &&
+           a.given.has_value() == b.given.has_value() && matrix(a) == matrix(b);
   }
 };
 

@@ -70,7 +70,7 @@ std::vector<std::string> lines_of(const StoredState& state) {
     return std::string(reinterpret_cast<const char*>(flat.data()), sizeof flat);
   };
   const auto correlation = [](const StoredCorrelation& kept) {
-    return to_blob(kept.said) + (kept.observed ? to_blob(*kept.observed) : std::string());
+    return to_blob(kept.said) + observed_blob(kept);
   };
   for (const StoredFrame& frame : state.frames) {
     lines.push_back("frame " + frame.id + " < " + frame.parent + ", " +

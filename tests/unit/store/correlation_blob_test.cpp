@@ -46,6 +46,27 @@ TEST_CASE("a stored correlation that is truncated or too long is rejected") {
   CHECK_FALSE(correlation_from(whole + '\0'));
 }
 
+TEST_CASE("what observations have found is stored with the pose as it was given") {
+  Random random(0x7138);
+  INFO("seed " << random.seed());
+  StoredCorrelation kept;
+  CHECK(observed_blob(kept).empty());
+  kept.observed = any_correlation(random);
+  for (const auto& given : {std::optional<Pose>(), std::optional(random.pose())}) {
+    kept.given = given;
+    const std::string whole = observed_blob(kept);
+    StoredCorrelation back;
+    REQUIRE(read_observed(whole, back));
+    CHECK(back == kept);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      StoredCorrelation cut;
+      const bool complete = given && size == to_blob(*kept.observed).size();
+      CHECK(read_observed(whole.substr(0, size), cut).has_value() == complete);
+    }
+    CHECK_FALSE(read_observed(whole + '\0', back));
+  }
+}
+
 TEST_CASE("an invalid stored correlation is rejected") {
   Correlation bad;
   SECTION("a loading that is not a number") {

@@ -216,6 +216,55 @@ TEST_CASE("drift: the object in the map and in the base is as certain as is righ
   CHECK_CONSISTENT(in_base);
 }
 
+TEST_CASE("drift: after a restart it goes on from where an observation has found it") {
+  Drifting robot;
+  Drifting restarted;
+  const Covariance R = of_deviations(0.005, 0.005);
+  for (int step = 0; step <= 3; ++step) {
+    robot.G = shift(0.1 * step);
+    robot.drive(step);
+  }
+  REQUIRE(robot.see({shift(2 - 0.3), R}, 2, "observed:1"));
+  REQUIRE(robot.see({shift(2.1 - 0.4), R}, 3, "observed:2"));
+  for (const char* id : {"base", "object"}) {
+    const auto kept = robot.forest.kept(id);
+    REQUIRE(kept);
+    REQUIRE(restarted.forest.update(id, kept->X_PC));
+    REQUIRE(restarted.forest.resume(id, kept->correlation, kept->time));
+  }
+  // As a configuration that is read again.
+  EdgeTiming timing;
+  timing.drifts = true;
+  timing.process_noise = robot.Q;
+  REQUIRE(restarted.forest.set_timing("base", timing));
+  for (Drifting* one : {&robot, &restarted}) {
+    one->G = shift(0.4);
+    one->drive(4);
+    REQUIRE(one->see({shift(2.2 - 0.5), R}, 4, "observed:3"));
+    one->G = shift(0.5);
+    one->drive(5);
+  }
+  for (const auto& [a, b] : {std::pair("world", "base"), std::pair("base", "object")}) {
+    const auto expected = robot.forest.lookup(a, b, when(5));
+    const auto found = restarted.forest.lookup(a, b, when(5));
+    REQUIRE(expected);
+    REQUIRE(found);
+    const Matrix6d sigma = expected->covariance.of_specified().matrix();
+    CHECK((found->pose.translation() - expected->pose.translation()).norm() < 1e-12);
+    CHECK((found->covariance.of_specified().matrix() - sigma).norm() < 1e-9 * sigma.norm());
+  }
+  // Of an earlier instant, a value belongs to another clock.
+  Drifting again;
+  const auto kept = robot.forest.kept("base");
+  REQUIRE(kept);
+  REQUIRE(again.forest.resume("base", kept->correlation, kept->time));
+  again.G = shift(0.2);
+  again.drive(2);
+  const auto X = again.forest.lookup("world", "base", when(2));
+  REQUIRE(X);
+  CHECK(X->pose.translation().x() == Approx(0.2));
+}
+
 TEST_CASE("drift: between a sample and a corrected one there is a bound") {
   Drifting robot;
   for (int step = 0; step < 3; ++step) {
