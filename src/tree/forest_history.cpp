@@ -34,7 +34,7 @@ Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
     if (!frames_.newest(slot).held()) continue;
     SampleHistory::destroy(frames_.newest_value(slot).samples);
-    delete frames_.newest_value(slot).correlation.get();
+    const InArena<EdgeCorrelation> correlation(frames_.newest_value(slot).correlation);
   }
 }
 
