@@ -65,6 +65,8 @@ Loading compressed(const Loading& root) {
 Loading root_of_difference(const Loading& C, const Loading& D) {
   if (D.cols() == 0) return compressed(C);
   const Factor whole(C);
+  // Nothing is left of nothing; the eigenvalues of a matrix without rows are not defined.
+  if (whole.rank() == 0) return Loading(6, 0);
   const Eigen::MatrixXd taken = whole.whitening() * D;
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const auto rank = static_cast<Eigen::Index>(whole.rank());

@@ -5,7 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
+#include <type_traits>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace tfdude {
@@ -104,6 +107,25 @@ class Arena {
   std::array<Queue, kSmall> small_;
   std::unordered_map<std::size_t, Queue> large_;  // by lines
 };
+
+/// Gives an object back to its arena, which it knows.
+struct LeaveArena {
+  template <class T>
+  void operator()(const T* object) const {
+    Arena& arena = object->arena();
+    object->~T();
+    arena.release(const_cast<T*>(object), sizeof(T), alignof(T));  // NOLINT(*-const-cast): it ends
+  }
+};
+/// An object in an arena, which readers may follow. It has a function arena().
+template <class T>
+using InArena = std::unique_ptr<T, LeaveArena>;
+
+template <class T, class... Args>
+[[nodiscard]] InArena<T> make_in(Arena& arena, Args&&... args) {
+  void* block = arena.allocate(sizeof(T), alignof(T));
+  return InArena<T>(new (block) T(arena, std::forward<Args>(args)...));
+}
 
 /// A pointer to memory of this process alone, in memory that others can read. They learn whether it
 /// is null, and nothing about addresses.

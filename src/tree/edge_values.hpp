@@ -13,8 +13,7 @@
 #include "tree/revised_sample.hpp"
 
 // The value of one edge at an instant, for a walk along a path. The edge is one that is held here
-// (OwnEdge), or in the memory of another process (RemoteEdge), whose samples never have a
-// correlation of their own.
+// (OwnEdge), or in the memory of another process (RemoteEdge).
 namespace tfdude {
 
 // The type of an edge's value that a walk accumulates; for a Belief it is a Transform.
@@ -55,7 +54,7 @@ void add_noise(Transform& X, const Samples& samples, double seconds) {
 
 // The text is added by explained(), where all edges are known.
 inline tl::unexpected<Error> no_data(Errc code) { return fail(code, {}); }
-// An edge of another process that only that process can evaluate.
+// What another process has written cannot be read, or makes no sense.
 inline tl::unexpected<Error> not_readable() { return fail(Errc::kUnsupported, {}); }
 
 // The two newest samples of the edge, if it may be extrapolated so far.
@@ -74,10 +73,6 @@ Result<SampleHistory::Bracket> newest_of(const HeldVersion& edge, const Samples&
   return found;
 }
 
-inline const Correlation* said_of(const HeldVersion& edge) {
-  return edge.correlation != nullptr ? &edge.correlation->said : nullptr;
-}
-
 // How the error of the edge that is accumulated next is correlated.
 template <class Value>
 void correlate_next(PathAccumulation<Value>& path, const Correlation* correlation) {
@@ -88,6 +83,17 @@ void correlate_next(PathAccumulation<Value>& path, const Correlation* correlatio
       path.correlate_next(correlation->unknown, &correlation->common_errors);
     }
   }
+}
+
+// As said of the edge, unless its samples say otherwise. @return whether that could be read
+template <class Value, class Edge>
+bool correlate_as_said(PathAccumulation<Value>& path, const Edge& from, typename Edge::Copy& copy) {
+  const Correlation* said = nullptr;
+  if constexpr (std::is_same_v<Value, Belief>) {
+    if (!from.find_said(copy, said)) return false;
+    correlate_next(path, said);
+  }
+  return true;
 }
 
 // The instant of a walk.
@@ -130,10 +136,13 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
   moment.correlated = moment.correlated || is_correlated(newest);
   // A random walk of this density has also moved the sample before, by which the twist is wrong.
   const double noise = beyond * s + seconds(moment.age);
-  if constexpr (!std::is_same_v<Value, Pose> && !Edge::kRemote) {
-    if (revised || said_of(edge) != nullptr) {
-      const CorrelatedValue ahead = extrapolate_correlated(
-          before, newest, edge.X_PC, s, said_of(edge), edge.samples->timing().drifts);
+  if constexpr (!std::is_same_v<Value, Pose>) {
+    typename Edge::Copy copy;
+    const Correlation* said = nullptr;
+    if (!from.find_said(copy, said)) return not_readable();
+    if (revised || said != nullptr) {
+      const CorrelatedValue ahead =
+          extrapolate_correlated(before, newest, edge.X_PC, s, said, samples.drifts());
       return accumulate_correlated(path, ahead, samples, noise);
     }
   }
@@ -166,9 +175,10 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   const bool noisy = samples.has_noise();
   TransformParts first{};
   TransformParts second{};
+  typename Edge::Copy copy;
   if (!noisy && samples.given_parts(*found.before, first) &&
       samples.given_parts(*found.after, second)) {
-    if constexpr (!Edge::kRemote) correlate_next(path, said_of(*from.version));
+    if (!correlate_as_said(path, from, copy)) return not_readable();
     path.up_between(first, second, s);
     return {};
   }
@@ -177,26 +187,26 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   const Sample& before = *found.before;
   const Sample& after = *found.after;
   const double noise = seconds(moment.age) + s * (1.0 - s) * span * 1e-9;
-  if constexpr (!Edge::kRemote) {
-    const bool correlated = is_correlated(before) || is_correlated(after);
-    moment.correlated = moment.correlated || correlated;
-    if constexpr (!std::is_same_v<Value, Pose>) {
-      const EdgeTiming& timing = from.version->samples->timing();
-      const Correlation* said = said_of(*from.version);
-      if (timing.drifts) {
-        const double since = s * span * 1e-9;
-        const auto X = drifted_between(before, after, s, said, timing.process_noise, since);
-        if (X) return accumulate_correlated(path, *X, samples, seconds(moment.age));
-      }
-      if constexpr (std::is_same_v<Value, Belief>) {
-        if (correlated) {
-          const CorrelatedValue X = interpolate_observed(before, after, s, said);
-          return accumulate_correlated(path, X, samples, noise);
-        }
-      }
+  const bool correlated = is_correlated(before) || is_correlated(after);
+  moment.correlated = moment.correlated || correlated;
+  if constexpr (!std::is_same_v<Value, Pose>) {
+    if (samples.drifts()) {
+      const Correlation* said = nullptr;
+      if (!from.find_said(copy, said)) return not_readable();
+      const double since = s * span * 1e-9;
+      const auto X = drifted_between(before, after, s, said, samples.process_noise(), since);
+      if (X) return accumulate_correlated(path, *X, samples, seconds(moment.age));
     }
-    correlate_next(path, said_of(*from.version));
   }
+  if constexpr (std::is_same_v<Value, Belief>) {
+    if (correlated) {
+      const Correlation* said = nullptr;
+      if (!from.find_said(copy, said)) return not_readable();
+      const CorrelatedValue X = interpolate_observed(before, after, s, said);
+      return accumulate_correlated(path, X, samples, noise);
+    }
+  }
+  if (!correlate_as_said(path, from, copy)) return not_readable();
   OfEdge<Value>& X = path.place();
   interpolate(before, after, s, X);
   if (noisy) add_noise(X, samples, noise);
@@ -228,8 +238,11 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const Edge& from, Mome
   typename decltype(samples)::Copies copies;
   if (!samples.make_whole(found, copies)) return not_readable();
   moment.correlated = moment.correlated || is_correlated(*found.before);
-  if constexpr (!Edge::kRemote) {
-    correlate_next(path, correlation_at(*found.before, said_of(edge)));
+  typename Edge::Copy copy;
+  if constexpr (std::is_same_v<Value, Belief>) {
+    const Correlation* said = nullptr;
+    if (!from.find_said(copy, said)) return not_readable();
+    correlate_next(path, correlation_at(*found.before, said));
   }
   OfEdge<Value>& X = path.place();
   X = value_of<Value>(*found.before);

@@ -24,8 +24,7 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
   return found;
 }
 
-void Forest::Impl::set_correlation(HeldVersion& fresh,
-                                   std::unique_ptr<EdgeCorrelation> correlation) {
+void Forest::Impl::set_correlation(HeldVersion& fresh, InArena<EdgeCorrelation> correlation) {
   reclaimer_.supersede(fresh.correlation);
   fresh.correlation = correlation.release();
 }
@@ -33,26 +32,25 @@ void Forest::Impl::set_correlation(HeldVersion& fresh,
 void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
   // The next value of an edge that drifts has the same error.
   if (!drifts(fresh)) unlink(fresh);
-  const Correlation& said = fresh.correlation->said;
-  std::unique_ptr<EdgeCorrelation> correlation;
-  if (!said.empty()) correlation.reset(new EdgeCorrelation{said, said, false, 0});
-  set_correlation(fresh, std::move(correlation));
+  const Correlation& said = fresh.correlation->said();
+  if (said.empty()) return set_correlation(fresh, nullptr);
+  correlate(fresh, said);
 }
 
 void Forest::Impl::unlink(const HeldVersion& edge) {
   const std::string_view id = edge.name->text;
-  for (const std::string& other : edge.correlation->now.observed_with) {
+  for (const std::string& other : edge.correlation->now().observed_with) {
     const auto slot = frames_.held_slot(other);
     if (!slot || *slot == edge.slot) continue;
     const HeldVersion& partner = frames_.newest_value(*slot);
-    if (partner.correlation == nullptr || !partner.correlation->revised) continue;
-    EdgeCorrelation left{partner.correlation->said, partner.correlation->now, true, 0};
-    auto& with = left.now.observed_with;
+    if (partner.correlation == nullptr || !partner.correlation->revised()) continue;
+    Correlation left = partner.correlation->now();
+    auto& with = left.observed_with;
     const auto own = std::remove(with.begin(), with.end(), id);
     if (own == with.end()) continue;
     with.erase(own, with.end());
     HeldVersion& fresh = push_held(*slot, partner.X_PC);
-    set_correlation(fresh, std::make_unique<EdgeCorrelation>(std::move(left)));
+    correlate(fresh, fresh.correlation->said(), std::move(left));
   }
 }
 
@@ -60,18 +58,16 @@ void Forest::Impl::unlink(const HeldVersion& edge) {
 // its sources.
 void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) {
   HeldVersion& fresh = push_held(slot, frames_.newest_value(slot).X_PC);
-  std::unique_ptr<EdgeCorrelation> correlation;
-  const bool revised = fresh.correlation != nullptr && fresh.correlation->revised;
-  if (revised || !said.empty()) {
-    correlation.reset(new EdgeCorrelation{said, said, revised, 0});
+  if (fresh.correlation == nullptr || !fresh.correlation->revised()) {
+    if (said.empty()) return set_correlation(fresh, nullptr);
+    return correlate(fresh, said);
   }
-  if (revised) {
-    const Correlation& before = fresh.correlation->now;
-    correlation->now.observed_with = before.observed_with;
-    std::copy_if(before.common_errors.begin(), before.common_errors.end(),
-                 std::back_inserter(correlation->now.common_errors), is_observed);
-  }
-  set_correlation(fresh, std::move(correlation));
+  const Correlation& before = fresh.correlation->now();
+  Correlation now = said;
+  now.observed_with = before.observed_with;
+  std::copy_if(before.common_errors.begin(), before.common_errors.end(),
+               std::back_inserter(now.common_errors), is_observed);
+  correlate(fresh, said, std::move(now));
 }
 
 Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {
@@ -95,13 +91,13 @@ Result<void> Forest::resume(std::string_view id, const StoredCorrelation& correl
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
   HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
-  std::unique_ptr<EdgeCorrelation> resumed;
-  if (!correlation.empty()) {
-    resumed.reset(new EdgeCorrelation{correlation.said,
-                                      correlation.observed.value_or(correlation.said),
-                                      correlation.observed.has_value(), 0});
+  if (correlation.empty()) {
+    impl_->set_correlation(fresh, nullptr);
+  } else if (!correlation.observed) {
+    impl_->correlate(fresh, correlation.said);
+  } else {
+    impl_->correlate(fresh, correlation.said, *correlation.observed);
   }
-  impl_->set_correlation(fresh, std::move(resumed));
   if (time.cleared || time.stamp) impl_->resume_history(fresh, time, correlation.given);
   impl_->commit();
   return {};
@@ -112,9 +108,9 @@ ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
       std::string(edge.name->text), edge.X_PC, {}, {std::nullopt, edge.stamp == kNoSample}};
   if (edge.moving() && !edge.lacks_sample()) kept.time.stamp = tfdude::time_of(edge.stamp);
   if (edge.correlation == nullptr) return kept;
-  kept.correlation.said = edge.correlation->said;
-  if (!edge.correlation->revised) return kept;
-  kept.correlation.observed = edge.correlation->now;
+  kept.correlation.said = edge.correlation->said();
+  if (!edge.correlation->revised()) return kept;
+  kept.correlation.observed = edge.correlation->now();
   if (!kept.time.stamp) return kept;
   const Sample* newest = edge.samples->sample(edge.number);
   if (newest != nullptr && newest->revision() != nullptr) {
@@ -190,16 +186,14 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
 
 void Forest::Impl::show_revision(std::uint32_t slot) {
   const HeldVersion& newest = frames_.newest_value(slot);
-  const Correlation said = newest.correlation != nullptr ? newest.correlation->said : Correlation();
-  const SampleRevision* revision = newest.samples->sample(newest.number)->revision();
-  std::unique_ptr<EdgeCorrelation> correlation;
-  if (revision != nullptr && !(revision->correlation.empty() && said.empty())) {
-    correlation.reset(new EdgeCorrelation{said, revision->correlation, true, 0});
-  } else if (newest.correlation == nullptr || !newest.correlation->revised) {
-    return;
-  }
+  const Correlation said =
+      newest.correlation != nullptr ? newest.correlation->said() : Correlation();
+  const SharedRevision* revision = newest.samples->sample(newest.number)->revision();
+  const bool correlated = revision != nullptr && !(revision->correlation().empty() && said.empty());
+  if (!correlated && (newest.correlation == nullptr || !newest.correlation->revised())) return;
   HeldVersion& shown = push_held(slot, newest.X_PC);
-  set_correlation(shown, std::move(correlation));
+  if (!correlated) return set_correlation(shown, nullptr);
+  correlate(shown, said, revision->correlation());
 }
 
 // The first value of a history says where the edge begins, with the covariance that is known of it.
@@ -214,7 +208,7 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
     return push_checked(newest, {X_PC}, stamp);
   }
   const Sample& before = *newest.samples->sample(newest.number);
-  const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said : nullptr;
+  const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
   // A late value counts as no more certain than the newest one.
   const double seconds = std::max(static_cast<double>(stamp - newest.stamp) * 1e-9, 0.0);
   const Pose& G_PC = value.X_PC.pose;
@@ -267,10 +261,9 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
       continue;
     }
     const Correlation said =
-        newest.correlation != nullptr ? newest.correlation->said : Correlation();
+        newest.correlation != nullptr ? newest.correlation->said() : Correlation();
     HeldVersion& fresh = impl_->push_held(slots[i], edges[i].X_PC);
-    impl_->set_correlation(fresh, std::unique_ptr<EdgeCorrelation>(
-                                      new EdgeCorrelation{said, edges[i].correlation, true, 0}));
+    impl_->correlate(fresh, said, edges[i].correlation);
   }
   impl_->commit();
   return {};

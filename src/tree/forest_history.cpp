@@ -34,7 +34,7 @@ Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
     if (!frames_.newest(slot).held()) continue;
     SampleHistory::destroy(frames_.newest_value(slot).samples);
-    delete frames_.newest_value(slot).correlation.get();
+    const InArena<EdgeCorrelation> correlation(frames_.newest_value(slot).correlation);
   }
 }
 
@@ -130,9 +130,9 @@ void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
                                   const std::optional<Pose>& given) {
   await_sample(fresh, left.cleared ? kNoSample : kUnsampled);
   if (left.cleared || !left.stamp) return;
-  const bool revised = given && fresh.correlation != nullptr && fresh.correlation->revised;
+  const bool revised = given && fresh.correlation != nullptr && fresh.correlation->revised();
   SampleRevision revision;
-  if (revised) revision = {{*given, {}}, fresh.correlation->now};
+  if (revised) revision = {{*given, {}}, fresh.correlation->now()};
   append_to(fresh, {fresh.X_PC, nullptr, revised ? &revision : nullptr}, nanoseconds(*left.stamp));
   fresh.samples->left_behind = true;
 }

@@ -143,11 +143,18 @@ class Forest::Impl {
   // Correlations (forest_correlation.cpp).
 
   /// Sets the correlation of the fresh version; null for none.
-  void set_correlation(HeldVersion& fresh, std::unique_ptr<EdgeCorrelation> correlation)
+  void set_correlation(HeldVersion& fresh, InArena<EdgeCorrelation> correlation)
       TFDUDE_REQUIRES(mutex_);
+  void correlate(HeldVersion& fresh, Correlation said) TFDUDE_REQUIRES(mutex_) {
+    set_correlation(fresh, make_in<EdgeCorrelation>(*arena_, std::move(said)));
+  }
+  /// @param now  as observations have left it
+  void correlate(HeldVersion& fresh, Correlation said, Correlation now) TFDUDE_REQUIRES(mutex_) {
+    set_correlation(fresh, make_in<EdgeCorrelation>(*arena_, std::move(said), std::move(now)));
+  }
   /// Drops what an observation has set for the edge, with its value.
   void end_revision(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_) {
-    if (fresh.correlation != nullptr && fresh.correlation->revised) correlate_as_said(fresh);
+    if (fresh.correlation != nullptr && fresh.correlation->revised()) correlate_as_said(fresh);
   }
   void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// The edges that were observed with this one are not correlated with its next value.
@@ -166,8 +173,9 @@ class Forest::Impl {
   /// if the common errors of observations are left out.
   [[nodiscard]] static Transform whole(const HeldVersion& edge) {
     const EdgeCorrelation* correlation = edge.correlation;
-    const bool observed = correlation != nullptr && correlation->revised;
-    return observed ? tfdude::whole(edge.X_PC, correlation->now, &correlation->said) : edge.X_PC;
+    const bool observed = correlation != nullptr && correlation->revised();
+    return observed ? tfdude::whole(edge.X_PC, correlation->now(), &correlation->said())
+                    : edge.X_PC;
   }
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// Replaces the dynamic edge's sample with that stamp, or inserts it. The value is taken as it

@@ -106,7 +106,7 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
     if (!check_common_errors(value->correlation.common_errors)) continue;
     correlated[value->index] = true;
     const Correlation before =
-        edge->correlation != nullptr ? edge->correlation->said : Correlation();
+        edge->correlation != nullptr ? edge->correlation->said() : Correlation();
     const Correlation said = said_in(*value);
     if (before == said) continue;
     impl_->say_correlation(edge->slot, said);

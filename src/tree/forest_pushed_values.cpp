@@ -53,17 +53,17 @@ HistoryInfo history_of(const HeldVersion& edge) {
 // get all of its covariance.
 Correlation correlation_of(const HeldVersion& edge) {
   if (edge.correlation == nullptr) return {};
-  return edge.moving() ? edge.correlation->said : edge.correlation->now;
+  return edge.moving() ? edge.correlation->said() : edge.correlation->now();
 }
 
 Transform newest_of(const HeldVersion& edge) {
   const EdgeCorrelation* correlation = edge.correlation;
-  if (!edge.moving() || correlation == nullptr || !correlation->revised) return edge.X_PC;
-  return whole(edge.X_PC, correlation->now, &correlation->said);
+  if (!edge.moving() || correlation == nullptr || !correlation->revised()) return edge.X_PC;
+  return whole(edge.X_PC, correlation->now(), &correlation->said());
 }
 
 Transform value_of(const HeldVersion& edge, const Sample& sample) {
-  return whole(sample, edge.correlation != nullptr ? &edge.correlation->said : nullptr);
+  return whole(sample, edge.correlation != nullptr ? &edge.correlation->said() : nullptr);
 }
 
 // The number of the first sample to report, up to the edge's newest.

@@ -226,7 +226,7 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
       std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),
                    [&](const std::string& id) { return id != edge->name->text; });
     } else if (edge->correlation != nullptr) {
-      found.correlations[i].observed_with = edge->correlation->now.observed_with;
+      found.correlations[i].observed_with = edge->correlation->now().observed_with;
     }
   }
 }

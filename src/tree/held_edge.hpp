@@ -15,6 +15,7 @@ class OwnSamples {
 
   [[nodiscard]] bool has_noise() const { return samples_.has_noise(); }
   [[nodiscard]] const Covariance& process_noise() const { return samples_.timing().process_noise; }
+  [[nodiscard]] bool drifts() const { return samples_.timing().drifts; }
   [[nodiscard]] std::uint64_t oldest() const { return samples_.oldest(); }
   [[nodiscard]] const Sample* sample(std::uint64_t number) const { return samples_.sample(number); }
   [[nodiscard]] SampleHistory::Bracket around(std::int64_t t, std::uint64_t newest,
@@ -39,11 +40,21 @@ class OwnSamples {
 
 /// An edge that is held here.
 struct OwnEdge {
-  static constexpr bool kRemote = false;
-
   const HeldVersion* version = nullptr;
 
   [[nodiscard]] OwnSamples samples() const { return OwnSamples(*version); }
+
+  struct Copy {};
+  /// What is said of its correlation, and what that is now; null: nothing.
+  /// @param copy  keeps it, if it cannot be read where it is @return whether it could be read
+  [[nodiscard]] bool find_said(Copy& /*copy*/, const Correlation*& found) const {
+    found = version->correlation != nullptr ? &version->correlation->said() : nullptr;
+    return true;
+  }
+  [[nodiscard]] bool find_now(Copy& /*copy*/, const Correlation*& found) const {
+    found = version->correlation != nullptr ? &version->correlation->now() : nullptr;
+    return true;
+  }
 };
 
 }  // namespace tfdude

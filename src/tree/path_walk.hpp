@@ -25,6 +25,20 @@ PathAccumulation<Value> begin_path(Order order) {
   }
 }
 
+/// Lets `take` add an edge to the accumulation, with the correlation that it has now.
+template <class Value, class Edge, class Take>
+Result<void> pass(PathAccumulation<Value>& path, const Edge& edge, Take& take) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    typename Edge::Copy copy;
+    const Correlation* now = nullptr;
+    if (!edge.find_now(copy, now)) return not_readable();
+    correlate_next(path, now);
+    return take(path, edge);
+  } else {
+    return take(path, edge);
+  }
+}
+
 /// The walk that all lookups share. `take` gets the accumulation of an edge, and the edge, whose
 /// value it adds. The walk stops at an error of `take`.
 /// @param others  finds edges that others hold: OwnEdgesOnly, or RemoteReading, and errors have no
@@ -48,17 +62,13 @@ Result<void> walk(const Ends& ends, PathLookup::Absent absent, Order order, Othe
     PathAccumulation<Value>& path = from_a ? path_a : path_b;
     if (here->held()) {
       if (!error) {
-        const OwnEdge edge{static_cast<const HeldVersion*>(here)};
-        const EdgeCorrelation* correlation = edge.version->correlation;
-        correlate_next(path, correlation != nullptr ? &correlation->now : nullptr);
-        Result<void> taken = take(path, edge);
+        Result<void> taken = pass(path, OwnEdge{static_cast<const HeldVersion*>(here)}, take);
         if (!taken) error = std::move(taken.error());
       }
     } else if constexpr (!Others::kNone) {
       const RemoteEdge edge = others.find(*here);
       if (edge.version == nullptr) return no_data(Errc::kNotOwner);
-      correlate_next(path, nullptr);
-      if (Result<void> taken = take(path, edge); !taken) return taken;
+      if (Result<void> taken = pass(path, edge, take); !taken) return taken;
     } else if (!error || error->code != Errc::kNotOwner) {
       // A path to others may have many such edges.
       error = Error{Errc::kNotOwner,
@@ -74,13 +84,7 @@ Result<void> walk(const Ends& ends, PathLookup::Absent absent, Order order, Othe
 // Only a Belief can represent correlation.
 template <class Value>
 bool leaves_out_correlation(const HeldVersion& edge) {
-  return std::is_same_v<Value, Transform> && !edge.correlation.empty();
-}
-
-// Whether only the owner of the edge knows how its error is correlated.
-template <class Value, class Edge>
-bool is_told_by_owner(const Edge& edge) {
-  return Edge::kRemote && !std::is_same_v<Value, Pose> && !edge.version->correlation.empty();
+  return std::is_same_v<Value, Transform> && edge.correlation != nullptr;
 }
 
 /// X_AB at an instant.
@@ -95,7 +99,6 @@ Result<void> walk_at(const Ends& ends, PathLookup::Absent absent, const PathLook
   Moment moment{std::max(at.t, kNoSample + 1), age, query, at.common};
   const auto take = [&](auto& path, const auto& from) -> Result<void> {
     const HeldVersion& edge = *from.version;
-    if (is_told_by_owner<Value>(from)) return not_readable();
     if (leaves_out_correlation<Value>(edge)) met.correlated = true;
     if (edge.moving()) {
       met.moving = true;
@@ -120,7 +123,6 @@ Result<void> walk_newest(const Ends& ends, PathLookup::Absent absent, Order orde
   bool correlated = false;
   const auto take = [&](auto& path, const auto& from) -> Result<void> {
     const HeldVersion& edge = *from.version;
-    if (is_told_by_owner<Value>(from)) return not_readable();
     if (edge.limits()) {
       if (limiting == nullptr) limiting = &edge;
       if (edge.stamp != limiting->stamp) {
@@ -142,7 +144,7 @@ Result<void> walk_newest(const Ends& ends, PathLookup::Absent absent, Order orde
   return walk_at(ends, absent, {limiting->stamp, true}, query, others, met, X_AB);
 }
 
-inline Result<void> pass(Belief&& X_AB, const Output& output) {
+inline Result<void> hand_over(Belief&& X_AB, const Output& output) {
   output.X = {X_AB.pose, X_AB.own};
   output.X.covariance.set_complete(!X_AB.unspecified);
   output.correlation = {std::move(X_AB.unknown), std::move(X_AB.common_errors), {}};
@@ -160,7 +162,7 @@ Result<void> reach_newest(const Ends& ends, PathLookup::Absent absent, Order ord
   met = {};
   Belief whole;
   auto walked = walk_newest(ends, absent, order, others, met, whole);
-  return walked ? pass(std::move(whole), X_AB) : walked;
+  return walked ? hand_over(std::move(whole), X_AB) : walked;
 }
 template <class Others>
 Result<void> reach_at(const Ends& ends, PathLookup::Absent absent, const PathLookup::Instant& at,
@@ -172,7 +174,7 @@ Result<void> reach_at(const Ends& ends, PathLookup::Absent absent, const PathLoo
   met = {};
   Belief whole;
   auto walked = walk_at(ends, absent, at, query, others, met, whole);
-  return walked ? pass(std::move(whole), X_AB) : walked;
+  return walked ? hand_over(std::move(whole), X_AB) : walked;
 }
 
 /// X_AB at the latest common time, as one transform.

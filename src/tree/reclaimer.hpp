@@ -72,7 +72,7 @@ class Reclaimer {
   SampleStore samples_;
   std::size_t superseded_ = 0;  // versions, since the readers were last checked
   Waiting<SampleHistory, SampleHistory::Pointer> histories_;
-  Waiting<EdgeCorrelation, std::unique_ptr<EdgeCorrelation>> correlations_;
+  Waiting<EdgeCorrelation, InArena<EdgeCorrelation>> correlations_;
 };
 
 }  // namespace tfdude

@@ -120,7 +120,7 @@ class RemoteReading {
     const Snapshot& of = owners_[binding->index];
     // The place of one that was detached meanwhile may be that of another one.
     if (of.forest != forest) return {};
-    return {forest->at(binding->place, of.commit), forest};
+    return {forest->at(binding->place, of.commit), forest, &common_errors_left_};
   }
 
   /// Whether nothing that was found since clear() was overwritten.
@@ -136,11 +136,15 @@ class RemoteReading {
   void clear() {
     taken_ = {};
     used_ = false;
+    common_errors_left_ = kMostCommonErrors;
   }
   /// Whether anything was found since then.
   [[nodiscard]] bool used() const { return used_; }
 
  private:
+  // Of all edges together, as the time to add them up is that of their square.
+  static constexpr std::size_t kMostCommonErrors = 1024;
+
   struct Snapshot {
     const RemoteForest* forest;
     std::uint64_t commit;
@@ -158,6 +162,7 @@ class RemoteReading {
 
   const RemoteEdges& edges_;
   bool used_ = false;
+  std::size_t common_errors_left_ = kMostCommonErrors;
   std::array<std::uint64_t, RemoteEdges::kMostOwners / 64> taken_{};
   // Those that are taken are set.
   std::array<Snapshot, RemoteEdges::kMostOwners> owners_;  // NOLINT(*-member-init): see above

@@ -2,12 +2,14 @@
 
 #include <cstring>
 #include <initializer_list>
+#include <utility>
+#include <vector>
 
 namespace tfdude {
 namespace {
 
 // Increase it if the same bytes mean something else.
-constexpr std::uint64_t kLayout = 1;
+constexpr std::uint64_t kLayout = 2;
 
 // How many newer versions a reader passes. An owner that has written more of one edge, while
 // somebody reads, has overwritten what is read anyway.
@@ -31,11 +33,10 @@ std::uint64_t place_of(const Whole& whole, const Part& part) {
   return reinterpret_cast<std::uint64_t>(&part) - reinterpret_cast<std::uint64_t>(&whole);
 }
 
-// The memory may contain a byte that no truth value has.
-bool is_set(const bool& flag) {
-  std::uint8_t byte = 0;
-  std::memcpy(&byte, &flag, sizeof(byte));
-  return byte != 0;
+// For copies.
+Arena& heap() {
+  static Arena heap;
+  return heap;
 }
 
 std::uint64_t hash_of_words(std::initializer_list<std::uint64_t> words) {
@@ -59,6 +60,9 @@ std::uint64_t layout_hash() {
     const Name name;
     const EdgeTiming timing;
     const SharedJoint joint;
+    const SharedCovariance covariance;
+    const EdgeCorrelation correlation(heap(), {});
+    const SharedRevision revision(heap(), {});
     // The order of both parts of a view.
     const std::string_view view("12345678", 3);
     return hash_of_words({kLayout,
@@ -70,7 +74,11 @@ std::uint64_t layout_hash() {
                           sizeof(SampleChunk),
                           SampleChunk::kSize,
                           sizeof(SampleHistory),
-                          sizeof(SharedCovariance),
+                          sizeof(covariance),
+                          sizeof(correlation),
+                          sizeof(revision),
+                          sizeof(FlatCorrelation),
+                          sizeof(FlatCorrelation::Entry),
                           sizeof(joint),
                           sizeof(name),
                           sizeof(IdTable::Table),
@@ -79,6 +87,7 @@ std::uint64_t layout_hash() {
                           SampleHistory::layout(),
                           place_of(held, held.X_PC),
                           place_of(held, held.samples),
+                          place_of(held, held.correlation),
                           place_of(held, held.stamp),
                           place_of(held, held.number),
                           place_of(held, held.attachment),
@@ -87,6 +96,12 @@ std::uint64_t layout_hash() {
                           place_of(roots, roots.heads),
                           place_of(name, name.slot),
                           place_of(timing, timing.process_noise),
+                          place_of(timing, timing.drifts),
+                          place_of(covariance, covariance.revision),
+                          place_of(correlation, correlation.flat_said()),
+                          place_of(correlation, correlation.flat_now()),
+                          place_of(revision, revision.given),
+                          place_of(revision, revision.flat()),
                           place_of(joint, joint.joint),
                           std::uint64_t{word_of(view) == view.size()},
                           IdTable::hash_of("tf-dude: the layout")});
@@ -174,13 +189,42 @@ std::optional<RemotePlace> RemoteForest::find(std::string_view id, std::string_v
   return std::nullopt;
 }
 
-RemoteSamples::RemoteSamples(const RemoteForest& forest, const HeldVersion& edge)
-    : forest_(forest),
-      samples_(forest.here(static_cast<const SampleHistory*>(RemoteForest::load(edge.samples)))) {
+bool RemoteEdge::read(const FlatCorrelation* theirs, Correlation& copy) const {
+  const FlatCorrelation* head = forest->here(theirs);
+  const std::uint32_t bytes = head != nullptr ? RemoteForest::load(head->bytes) : 0;
+  if (bytes < sizeof(FlatCorrelation) || bytes > FlatCorrelation::kMostBytes) return false;
+  // NOLINTNEXTLINE(*-reinterpret-cast): of bytes
+  const char* block = forest->here(reinterpret_cast<const char*>(theirs), bytes);
+  if (block == nullptr) return false;
+  const std::vector<char> once(block, block + bytes);
+  return read_flat(once.data(), bytes, *common_errors_left, copy);
+}
+
+bool RemoteEdge::find(Copy& copy, const Correlation*& found, bool now) const {
+  const EdgeCorrelation* theirs = RemoteForest::load(version->correlation);
+  if (theirs == nullptr) return true;
+  const EdgeCorrelation* correlation = forest->here(theirs);
+  if (correlation == nullptr) return false;
+  found = &copy;
+  const FlatCorrelation* of_now = now ? RemoteForest::load(correlation->flat_now()) : nullptr;
+  return read(of_now != nullptr ? of_now : RemoteForest::load(correlation->flat_said()), copy);
+}
+
+bool RemoteSamples::is_set(const bool& flag) {
+  std::uint8_t byte = 0;
+  std::memcpy(&byte, &flag, sizeof(byte));
+  return byte != 0;
+}
+
+RemoteSamples::RemoteSamples(const RemoteEdge& edge)
+    : edge_(edge),
+      forest_(*edge.forest),
+      samples_(forest_.here(
+          static_cast<const SampleHistory*>(RemoteForest::load(edge.version->samples)))) {
   if (samples_ == nullptr) return;
   mask_ = RemoteForest::load(samples_->mask());
   if (mask_ >= kMostChunks) return;
-  chunks_ = forest.here(
+  chunks_ = forest_.here(
       static_cast<const std::atomic<SampleChunk*>*>(RemoteForest::load(samples_->chunks())),
       mask_ + 1);
 }
@@ -207,8 +251,7 @@ bool RemoteSamples::copy(const Sample& sample, Copies::One& copy) const {
   copy.sample = sample;
   const SharedPart* theirs = copy.sample.shared;
   const SharedPart* shared = forest_.here(theirs);
-  // Only its owner can follow what observations have made of a sample.
-  if (shared == nullptr || is_set(shared->is_revised)) return false;
+  if (shared == nullptr) return false;
   if (is_set(shared->is_joint)) {
     const auto* joint = forest_.here(static_cast<const SharedJoint*>(theirs));
     if (joint == nullptr) return false;
@@ -223,6 +266,15 @@ bool RemoteSamples::copy(const Sample& sample, Copies::One& copy) const {
     auto& own = copy.shared.emplace<SharedCovariance>();
     own.covariance = covariance->covariance;
     copy.sample.shared = &own;
+    if (!is_set(shared->is_revised)) return true;
+    const SharedRevision* revision = forest_.here(RemoteForest::load(covariance->revision));
+    SampleRevision read;
+    if (revision == nullptr) return false;
+    read.given = revision->given;
+    if (!edge_.read(RemoteForest::load(revision->flat()), read.correlation)) return false;
+    own.is_revised = true;
+    own.is_given = false;
+    own.set_revision(make_in<const SharedRevision>(heap(), std::move(read)));
   }
   return true;
 }

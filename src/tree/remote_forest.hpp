@@ -25,6 +25,8 @@ struct RemotePlace {
   std::uint32_t attachment = 0;
 };
 
+class RemoteSamples;
+
 /// The forest of another process, read in its memory (Arena). Writes nothing, takes no lock, and
 /// follows only pointers that stay in the memory, whatever that contains; all loops end. What was
 /// read is to be used only if intact() says so afterwards.
@@ -100,13 +102,38 @@ class RemoteForest {
   const SharedRoots* roots_;
 };
 
+/// An edge in the memory of its owner, at a commit.
+struct RemoteEdge {
+  const HeldVersion* version = nullptr;
+  const RemoteForest* forest = nullptr;
+  std::size_t* common_errors_left = nullptr;  // that may still be read
+
+  [[nodiscard]] inline RemoteSamples samples() const;
+
+  // As of OwnEdge.
+  using Copy = Correlation;
+  [[nodiscard]] bool find_said(Copy& copy, const Correlation*& found) const {
+    return version->correlation == nullptr || find(copy, found, false);
+  }
+  [[nodiscard]] bool find_now(Copy& copy, const Correlation*& found) const {
+    return version->correlation == nullptr || find(copy, found, true);
+  }
+
+  /// Copies a correlation of the owner. @return false: it cannot be read, or there are too many
+  [[nodiscard]] bool read(const FlatCorrelation* theirs, Correlation& copy) const;
+
+ private:
+  [[nodiscard]] bool find(Copy& copy, const Correlation*& found, bool now) const;
+};
+
 /// As OwnSamples, of an edge in the memory of its owner. What cannot be read counts as missing.
 class RemoteSamples {
  public:
-  RemoteSamples(const RemoteForest& forest, const HeldVersion& edge);
+  explicit RemoteSamples(const RemoteEdge& edge);
 
   [[nodiscard]] bool has_noise() const { return there() && samples_->has_noise(); }
   [[nodiscard]] const Covariance& process_noise() const { return samples_->timing().process_noise; }
+  [[nodiscard]] bool drifts() const { return there() && is_set(samples_->timing().drifts); }
   [[nodiscard]] std::uint64_t oldest() const { return there() ? samples_->oldest() : UINT64_MAX; }
   [[nodiscard]] const Sample* sample(std::uint64_t number) const;
   [[nodiscard]] SampleHistory::Bracket around(std::int64_t t, std::uint64_t newest,
@@ -132,20 +159,16 @@ class RemoteSamples {
   [[nodiscard]] bool there() const { return chunks_ != nullptr; }
   [[nodiscard]] bool copy(const Sample& sample, Copies::One& copy) const;
 
+  // The memory may contain a byte that no truth value has.
+  [[nodiscard]] static bool is_set(const bool& flag);
+
+  const RemoteEdge& edge_;
   const RemoteForest& forest_;
   const SampleHistory* samples_ = nullptr;
   const std::atomic<SampleChunk*>* chunks_ = nullptr;
   std::uint64_t mask_ = 0;
 };
 
-/// An edge in the memory of its owner, at a commit.
-struct RemoteEdge {
-  static constexpr bool kRemote = true;
-
-  const HeldVersion* version = nullptr;
-  const RemoteForest* forest = nullptr;
-
-  [[nodiscard]] RemoteSamples samples() const { return {*forest, *version}; }
-};
+inline RemoteSamples RemoteEdge::samples() const { return RemoteSamples(*this); }
 
 }  // namespace tfdude

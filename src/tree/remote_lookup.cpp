@@ -29,7 +29,7 @@ Result<Value> computed(const RemoteEdges& others, Compute compute) {
   bool intact = false;
   for (int tries = 0; tries < kTries && !intact; ++tries) {
     reading.clear();
-    if (!X_AB) X_AB.emplace();
+    if (tries > 0) X_AB = Value();
     if (Result<void> ok = compute(reading, *X_AB); !ok) {
       X_AB = tl::unexpected(std::move(ok.error()));
     }

@@ -46,8 +46,8 @@ CorrelatedValue split(Transform X, std::vector<CommonError> common_errors, bool 
 }  // namespace
 
 const Correlation* correlation_at(const Sample& sample, const Correlation* said) {
-  const SampleRevision* revision = sample.revision();
-  return revision != nullptr ? &revision->correlation : said;
+  const SharedRevision* revision = sample.revision();
+  return revision != nullptr ? &revision->correlation() : said;
 }
 
 Transform whole(const Transform& X_PC, const Correlation& now, const Correlation* said) {
@@ -66,9 +66,9 @@ Transform whole(const Transform& X_PC, const Correlation& now, const Correlation
 }
 
 Transform whole(const Sample& sample, const Correlation* said) {
-  const SampleRevision* revision = sample.revision();
+  const SharedRevision* revision = sample.revision();
   const Transform X = sample.value();
-  return revision != nullptr ? whole(X, revision->correlation, said) : X;
+  return revision != nullptr ? whole(X, revision->correlation(), said) : X;
 }
 
 CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pose& G_PC,
@@ -109,7 +109,7 @@ std::optional<CorrelatedValue> drifted_between(const Sample& before, const Sampl
 }
 
 Transform given(const Sample& sample) {
-  const SampleRevision* revision = sample.revision();
+  const SharedRevision* revision = sample.revision();
   return revision != nullptr ? revision->given : sample.value();
 }
 

@@ -43,8 +43,8 @@ struct CorrelatedValue {
 
 /// Whether an observation has correlated the sample with others.
 [[nodiscard]] inline bool is_correlated(const Sample& sample) {
-  const SampleRevision* revision = sample.revision();
-  return revision != nullptr && !revision->correlation.empty();
+  const SharedRevision* revision = sample.revision();
+  return revision != nullptr && !revision->correlation().empty();
 }
 
 /// How the error of a sample is correlated: as `said` of its edge, unless it was observed.

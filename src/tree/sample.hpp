@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "tfdude/math/transform.hpp"
-#include "tfdude/types/correlation.hpp"
 
 #include "math/joint_state.hpp"
 #include "math/path_accumulation.hpp"
 #include "tree/arena.hpp"
+#include "tree/shared_correlation.hpp"
 
 namespace tfdude {
 
@@ -33,17 +33,20 @@ struct SharedPart {
   bool is_given = true;     ///< neither: a pose as it was given
 };
 
-/// What an observation has made of a sample: its error is one row of the joint covariance of all
-/// that was observed then (a delayed state), while the samples around it stay as they were given.
-struct SampleRevision {
-  Transform given;          ///< the sample before all observations
-  Correlation correlation;  ///< of this sample, instead of what is said of the edge
-};
-
 /// Three cache lines.
 struct alignas(64) SharedCovariance : SharedPart {
+  SharedCovariance() = default;
+  ~SharedCovariance() { set_revision(nullptr); }
+  SharedCovariance(const SharedCovariance&) = delete;
+  SharedCovariance& operator=(const SharedCovariance&) = delete;
+
+  void set_revision(InArena<const SharedRevision> fresh) {
+    const InArena<const SharedRevision> before(revision);
+    revision = fresh.release();
+  }
+
   StatedCovariance covariance;
-  VeiledOwner<const SampleRevision> revision;  ///< null: as given
+  const SharedRevision* revision = nullptr;  ///< its own; null: as given
 };
 static_assert(sizeof(SharedCovariance) == 192);
 
@@ -88,9 +91,9 @@ class Sample {
   /// Whether it is a pose as it was given.
   [[nodiscard]] bool is_given_pose() const { return shared->is_given; }
   /// Null: it is as it was given.
-  [[nodiscard]] const SampleRevision* revision() const {
+  [[nodiscard]] const SharedRevision* revision() const {
     if (!shared->is_revised) return nullptr;
-    return static_cast<const SharedCovariance*>(shared)->revision.get();
+    return static_cast<const SharedCovariance*>(shared)->revision;
   }
 
   [[nodiscard]] Transform value() const;

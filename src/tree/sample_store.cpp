@@ -64,7 +64,8 @@ const SharedPart* SampleStore::fresh_part(const GivenValue& value) {
     part->covariance = value.X_PC.covariance;
     part->is_revised = value.revision != nullptr;
     part->is_given = !part->is_revised;
-    part->revision.reset(value.revision != nullptr ? new SampleRevision(*value.revision) : nullptr);
+    part->set_revision(part->is_revised ? make_in<const SharedRevision>(arena_, *value.revision)
+                                        : nullptr);
     bytes_ += bytes_of(*part);
     return part;
   }

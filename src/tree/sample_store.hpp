@@ -63,14 +63,8 @@ class SampleStore {
 /// The memory of a part that samples share.
 [[nodiscard]] inline std::size_t bytes_of(const SharedPart& shared) {
   if (shared.is_joint) return sizeof(SharedJoint);
-  const SampleRevision* revision = static_cast<const SharedCovariance&>(shared).revision.get();
-  if (revision == nullptr) return sizeof(SharedCovariance);
-  std::size_t bytes = sizeof(SharedCovariance) + sizeof(SampleRevision);
-  for (const CommonError& one : revision->correlation.common_errors) {
-    bytes += sizeof(one) + static_cast<std::size_t>(one.loading.size()) * sizeof(double);
-  }
-  for (const std::string& id : revision->correlation.observed_with) bytes += sizeof(id) + id.size();
-  return bytes;
+  const SharedRevision* revision = static_cast<const SharedCovariance&>(shared).revision;
+  return sizeof(SharedCovariance) + (revision != nullptr ? revision->bytes() : 0);
 }
 
 }  // namespace tfdude

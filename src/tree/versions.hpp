@@ -12,6 +12,7 @@
 #include "tree/forest.hpp"
 #include "tree/id_table.hpp"
 #include "tree/sample_history.hpp"
+#include "tree/shared_correlation.hpp"
 
 namespace tfdude {
 
@@ -46,19 +47,11 @@ struct Version {
   [[nodiscard]] bool held() const { return present() && owner == kHeldHere; }
 };
 
-/// How an edge's error is correlated with others. Immutable, shared by the edge's versions.
-struct EdgeCorrelation {
-  Correlation said;
-  Correlation now;       ///< after observations, until the next update
-  bool revised = false;  ///< the two differ
-  std::uint64_t retire_tag = 0;
-};
-
 /// A version of an edge whose value is held here. The fields are ordered for lookups: a climb needs
 /// the first two cache lines, which end with the pose, and then the covariance.
 struct alignas(64) HeldVersion : Version {
-  std::int64_t stamp = kAlways;         // of the newest sample
-  Veiled<EdgeCorrelation> correlation;  // null: independent
+  std::int64_t stamp = kAlways;            // of the newest sample
+  EdgeCorrelation* correlation = nullptr;  // null: independent
   Transform X_PC;
   std::uint64_t number = 0;          // of the newest sample in the history
   SampleHistory* samples = nullptr;  // null: no history and no timing of its own

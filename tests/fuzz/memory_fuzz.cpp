@@ -42,6 +42,15 @@ struct Owner {
             at_ms(100 + 10 * n + i));
       }
     }
+    const Loading loading = Loading::Constant(6, 3, 1e-3);
+    const Correlation said{true, {{"source", false, loading}}, {}};
+    const Correlation observed{
+        false, {{"observed:1", false, loading}, {"observed:2", true, 0.1 * loading}}, {link(1)}};
+    (void)forest.correlate(link(2), said);
+    (void)forest.correlate(link(5), said);
+    (void)forest.revise({{link(1), Transform::exact({}), observed}}, std::nullopt, UINT64_MAX);
+    (void)forest.revise({{link(3), Transform::exact({}), observed}}, at_ms(203), UINT64_MAX);
+    (void)forest.revise({{link(6), Transform::exact({}), observed}}, at_ms(210), UINT64_MAX);
   }
   std::unique_ptr<char, void (*)(char*)> memory{
       static_cast<char*>(std::aligned_alloc(kPage, kSize)), [](char* at) { std::free(at); }};

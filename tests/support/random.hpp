@@ -77,6 +77,14 @@ class Random {
     return Covariance::trusted(Matrix6d(scale.asDiagonal() * unit * scale.asDiagonal()));
   }
 
+  /// A loading of a common error; standard deviations of about `size` [m, rad].
+  [[nodiscard]] Eigen::Matrix<double, 6, Eigen::Dynamic> loading(Eigen::Index columns,
+                                                                 double size = 0.01) {
+    Eigen::Matrix<double, 6, Eigen::Dynamic> F(6, columns);
+    std::generate_n(F.data(), F.size(), [&] { return size * normal(); });
+    return F;
+  }
+
   [[nodiscard]] Transform transform(double reach = 2.0, double metres = 0.01,
                                     double radians = 0.01) {
     const Pose X = pose(reach);

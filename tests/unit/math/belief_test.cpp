@@ -221,5 +221,11 @@ TEST_CASE("Invalid common errors are rejected by name") {
   CHECK_THAT(refusal({{"s", false, bad}}), ContainsSubstring("not a number"));
 }
 
+TEST_CASE("Nothing is left of an exact error of which something is subtracted") {
+  Belief X;
+  X.common_errors = {{"observed:1", true, Loading::Identity(6, 2)}};
+  CHECK(collapse(X).covariance.of_specified().matrix().isZero(0));
+}
+
 }  // namespace
 }  // namespace tfdude

@@ -63,9 +63,11 @@ class World {
       move(id, any_id());
     } else if (dice < 32) {
       set_timing(id);
-    } else if (dice < 35) {
-      if (frame(id) != nullptr) correlate(id);
-    } else if (dice < 40) {
+    } else if (dice < 36) {
+      correlate(id);
+    } else if (dice < 44) {
+      revise(id);
+    } else if (dice < 49) {
       each_of(id, [&](Forest& forest) { return forest.clear_history(id); });
     } else {
       update(id);
@@ -83,9 +85,8 @@ class World {
     if (random_.index(4) == 0) query.age_noise_until = at_ms(now_ + 50);
     if (random_.index(5) == 0) query.order = Order::kFourth;
     const std::string what = a + " " + b + ": ";
-    const bool correlated = has_correlation(a, b);
     const auto newest = read(reader_, others_, a, b, [&] { return reader_.lookup(a, b, others_); });
-    if (auto wrong = differs(newest, oracle_.lookup(a, b), correlated); !wrong.empty()) {
+    if (auto wrong = differs(newest, oracle_.lookup(a, b)); !wrong.empty()) {
       return what + wrong;
     }
     const auto pose =
@@ -96,27 +97,28 @@ class World {
     const auto found =
         read(reader_, others_, a, b, [&] { return reader_.lookup(a, b, query, others_); });
     const auto expected = oracle_.lookup(a, b, query);
-    if (auto wrong = differs(found, expected, correlated); !wrong.empty()) return what + wrong;
+    if (auto wrong = differs(found, expected); !wrong.empty()) return what + wrong;
     if (found && found->stamp != expected->stamp) return what + "another stamp";
     if (found && found->basis.unspecified != expected->basis.unspecified) {
       return what + "other unspecified edges";
     }
+    if (found && found->basis.sources != expected->basis.sources) return what + "other sources";
+    if (found && found->basis.bound != expected->basis.bound) return what + "another bound";
     if (found) ++answered_;
     if (found && found->stamp) ++dynamic_;
-    if (!found && expected) ++only_owners_;
+    if (found && (found->basis.bound || !found->basis.sources.empty())) ++correlated_;
     return "";
   }
 
   [[nodiscard]] int answered() const { return answered_; }
   [[nodiscard]] int dynamic() const { return dynamic_; }
-  [[nodiscard]] int only_owners() const { return only_owners_; }
+  [[nodiscard]] int correlated() const { return correlated_; }
 
  private:
   struct Frame {
     std::string id;
     std::string parent;
     Owner owner;
-    bool correlated = false;
   };
 
   // The forest of an owner; 0 is the reader.
@@ -195,21 +197,47 @@ class World {
     timing.count = 2 + random_.index(60);
     timing.span = std::chrono::milliseconds(20 + random_.index(200));
     timing.moving = random_.index(2) == 0;
-    if (random_.index(2) == 0) timing.process_noise = random_.covariance();
+    if (random_.index(2) == 0) {
+      timing.process_noise = random_.covariance();
+      timing.drifts = random_.index(2) == 0;
+    }
     each_of(id, [&](Forest& forest) { return forest.set_timing(id, timing); });
   }
 
-  void correlate(const std::string& id) {
+  Correlation correlation(const std::string& prefix) {
     Correlation correlation;
-    correlation.unknown = random_.index(3) == 0;
-    frame(id)->correlated = correlation.unknown;
-    each_of(id, [&](Forest& forest) { return forest.correlate(id, correlation); });
+    if (random_.index(3) == 0) return correlation;
+    correlation.unknown = random_.index(4) == 0;
+    for (int i = 0; i < 4; ++i) {
+      if (random_.index(2) == 0) continue;
+      const auto columns = static_cast<Eigen::Index>(1 + random_.index(4));
+      correlation.common_errors.push_back(
+          {prefix + std::to_string(i), false, random_.loading(columns, 0.003)});
+    }
+    return correlation;
   }
 
-  bool has_correlation(const std::string& a, const std::string& b) {
-    const auto edges = oracle_.edges(a, b);
-    return edges && std::any_of(edges->begin(), edges->end(),
-                                [&](const FrameInfo& edge) { return frame(edge.id)->correlated; });
+  void correlate(const std::string& id) {
+    const Correlation said = correlation("source ");
+    each_of(id, [&](Forest& forest) { return forest.correlate(id, said); });
+  }
+
+  // As an observation does.
+  void revise(const std::string& id) {
+    if (frame(id)->parent.empty()) return;
+    Revision revision{id, random_.transform(), correlation(std::string(kObservedPrefix))};
+    if (random_.index(3) > 0) revision.correlation.observed_with = {any_id()};
+    if (random_.index(3) == 0 && !revision.correlation.common_errors.empty()) {
+      CommonError removed = revision.correlation.common_errors.front();
+      removed.subtracts = true;
+      removed.loading *= 0.1;
+      revision.correlation.common_errors.push_back(removed);
+    }
+    const Time at = at_ms(now_ - static_cast<std::int64_t>(random_.index(30)));
+    each_of(id, [&](Forest& forest) {
+      const bool moving = forest.kept(id)->time.stamp.has_value();
+      return forest.revise({revision}, moving ? std::optional<Time>(at) : std::nullopt, UINT64_MAX);
+    });
   }
 
   void update(const std::string& id) {
@@ -235,12 +263,9 @@ class World {
   }
 
   template <class Value>
-  static std::string differs(const Result<Value>& found, const Result<Value>& expected,
-                             bool correlated) {
+  static std::string differs(const Result<Value>& found, const Result<Value>& expected) {
     if (found && !expected) return "an answer where there is " + outcome(expected);
-    if (!found) {
-      return expected && !correlated ? "not read: " + outcome(found) : "";
-    }
+    if (!found) return expected ? "not read: " + outcome(found) : "";
     return transform_diff(*found, *expected, 1e-12);
   }
 
@@ -260,7 +285,7 @@ class World {
   int made_ = 0;
   int answered_ = 0;
   int dynamic_ = 0;
-  int only_owners_ = 0;
+  int correlated_ = 0;
 };
 
 }  // namespace
@@ -276,6 +301,7 @@ TEST_CASE("lookups in the memory of others are those of one forest") {
     }
     CHECK(world.answered() > 200);
     CHECK(world.dynamic() > 40);
+    CHECK(world.correlated() > 40);
   }
 }
 
@@ -380,6 +406,37 @@ TEST_CASE("memory that is not an owner's, or of another layout, is not opened") 
   CHECK_FALSE(RemoteForest::open(arm.memory.read(), arm.memory.size()));
 }
 
+TEST_CASE("correlations that are written again and again take no more memory") {
+  Random random(5);
+  SharedForest arm;
+  REQUIRE(arm.forest.add("base", "", along_x(0)));
+  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
+  REQUIRE(arm.forest.add("odometry", "base", along_x(1)));
+  EdgeTiming drifting;
+  drifting.process_noise = random.covariance();
+  drifting.drifts = true;
+  drifting.count = 50;
+  REQUIRE(arm.forest.set_timing("odometry", drifting));
+  std::int64_t t = 0;
+  const auto write = [&](int times) {
+    for (int i = 0; i < times; ++i) {
+      const std::vector<CommonError> errors{{"source", false, random.loading(1 + i % 20)}};
+      REQUIRE(arm.forest.correlate("tip", {false, errors, {}}));
+      REQUIRE(arm.forest.revise({{"tip", random.transform(), {false, errors, {"odometry"}}}},
+                                std::nullopt, UINT64_MAX));
+      REQUIRE(arm.forest.update("odometry", random.transform(), at_ms(++t)));
+      if (i % 10 == 0) {
+        REQUIRE(arm.forest.revise({{"odometry", random.transform(), {false, errors, {"tip"}}}},
+                                  at_ms(t), UINT64_MAX));
+      }
+    }
+  };
+  write(2000);
+  const std::size_t used = arm.arena->used();
+  write(4000);
+  CHECK(arm.arena->used() <= used + used / 10);
+}
+
 TEST_CASE("damaged memory does no harm") {
   Random random(7);
   INFO("seed " << random.seed());
@@ -409,6 +466,18 @@ TEST_CASE("damaged memory does no harm") {
         REQUIRE(arm.forest.update(id(i), random.transform(), at_ms(100 + 10 * n + i)));
       }
     }
+  }
+  const auto shared = [&](const std::string& prefix) {
+    return std::vector<CommonError>{{prefix + "1", false, random.loading(2)},
+                                    {prefix + "2", false, random.loading(36)}};
+  };
+  REQUIRE(arm.forest.correlate(id(2), {false, shared("source "), {}}));
+  REQUIRE(arm.forest.correlate(id(5), {true, shared("source "), {}}));
+  REQUIRE(arm.forest.clear_history(id(7)));
+  for (const int revised : {7, 8, 10}) {
+    REQUIRE(arm.forest.revise(
+        {{id(revised), random.transform(), {false, shared("observed:"), {id(11)}}}}, at_ms(250),
+        UINT64_MAX));
   }
   // Between pages that nobody may touch.
   const std::size_t used = (arm.arena->used() + kPage - 1) / kPage * kPage;
@@ -463,6 +532,7 @@ TEST_CASE("damaged memory does no harm") {
     Query query;
     query.at = at_ms(100 + static_cast<std::int64_t>(random.index(450)));
     query.extrapolate = std::chrono::milliseconds(20);
+    if (round % 3 == 0) query.order = Order::kFourth;
     const auto newest = here.lookup(id(0), id(kDepth), others);
     const auto then = here.lookup(id(0), id(kDepth), query, others);
     for (const Transform* X :

@@ -143,6 +143,46 @@ struct Seen {
   return seen;
 }
 
+/// As race_for_batches(), of edges whose errors share a source: each has a standard deviation of k
+/// m by it, so that the path has one of so many times that.
+[[nodiscard]] inline Seen race_for_correlations(Repeater::In in, std::uint64_t lookups) {
+  Chain chain;
+  Correlation said;
+  said.common_errors = {{"shared", false, Loading::Zero(6, 3)}};
+  std::vector<CorrelatedUpdate> batch;
+  for (const HandleUpdate& one : chain.batch) batch.push_back({one.frame, {}, &said, {}});
+  const auto write = [&](int k) {
+    said.common_errors[0].loading(0, 1) = k;
+    // So that blocks of many sizes are used again.
+    said.common_errors[0].source = "shared" + std::string(static_cast<std::size_t>(k % 200), '+');
+    for (CorrelatedUpdate& one : batch) one.X_PC = saying(k);
+    (void)chain.arm.forest.update_correlated(batch);
+  };
+  int k = 1;
+  write(k);
+  const Repeater writer(in, [&] { write(++k); });
+  Seen seen;
+  int last = 0;
+  for (std::uint64_t n = 0; goes_on(n, lookups, seen.states); ++n) {
+    const auto X = chain.here.lookup(link_of(0), link_of(kLinks), Query{}, chain.others);
+    if (!X) {
+      ++seen.given_up;
+      continue;
+    }
+    const double sum = X->pose.translation().x();
+    const double shared = X->covariance.of_specified().upper()[0] - std::abs(sum);
+    const int now = static_cast<int>(sum) / kLinks;
+    const bool whole = now * kLinks == sum && std::abs(shared - sum * sum) <= 1e-9 * sum * sum &&
+                       X->basis.sources.size() == 1 &&
+                       X->basis.sources[0].size() == 6 + static_cast<std::size_t>(now % 200);
+    ++(whole ? seen.right : seen.torn);
+    if (now < last) ++seen.back;
+    if (now > last) ++seen.states;
+    last = std::max(last, now);
+  }
+  return seen;
+}
+
 /// Looks up at instants of the last samples, while the owner adds samples, some of them late, and
 /// drops others. All edges turn at one rate, so the right answer is known.
 [[nodiscard]] inline Seen race_for_histories(Repeater::In in, std::uint64_t lookups) {

@@ -23,6 +23,10 @@ TEST_CASE("a reader of another process sees commits whole and in order") {
   check(testing::race_for_batches(Repeater::In::kProcess, 500'000));
 }
 
+TEST_CASE("a reader of another process sees correlations as they were in one commit") {
+  check(testing::race_for_correlations(Repeater::In::kProcess, 20'000));
+}
+
 TEST_CASE("a reader of another process sees histories as they were in one commit") {
   check(testing::race_for_histories(Repeater::In::kProcess, 100'000));
 }
