@@ -127,6 +127,7 @@ struct ForgetRequest {
 struct WatchRequest {
   std::vector<PathEnds> segments;      ///< edges, each from its parent
   bool composed = false;               ///< or runs of edges, each sent as one transform
+  bool of_samples = false;             ///< as PushedQuery::of_samples; not if composed
   std::chrono::nanoseconds period{0};  ///< minimum interval; 0: every sample
   /// The reply contains the samples from the last one not later than this, instead of the newest
   /// only. Does not affect the group.

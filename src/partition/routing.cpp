@@ -287,6 +287,7 @@ Result<WatchPlan> route_watch(const Forest& forest, const Directory& directory,
     auto& body = body_for<WatchRequest>(plan.parts, directory, owner, id);
     body.period = period;
     body.composed = composed;
+    body.of_samples = !composed;
     return body;
   };
   if (composed) {

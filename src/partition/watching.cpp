@@ -65,7 +65,7 @@ std::uint64_t watch_group(std::string_view partition, std::uint64_t incarnation,
   print.add(partition);
   print.add(incarnation);
   print.add(static_cast<std::uint64_t>(request.period.count()));
-  print.add(static_cast<std::uint64_t>(request.composed));
+  print.add(static_cast<std::uint64_t>(request.of_samples ? 2 : request.composed ? 1 : 0));
   for (const PathEnds& ends : request.segments) {
     print.add(ends.from);
     print.add(ends.to);
@@ -155,23 +155,31 @@ PushedValues WatchedGroup::next_push(const Forest& forest) {
 Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time> from) const {
   if (request_.composed) return composed(forest, from);
   auto cursors = fresh_cursors();
-  auto found = forest.values_since(cursors, {!from, from});
+  PushedQuery query{!from, from};
+  query.of_samples = request_.of_samples;
+  auto found = forest.values_since(cursors, query);
   for (const EdgeCursor& edge : cursors) {
     if (edge.history != 0) continue;
     return fail(Errc::kNotOwner, "frame " + quote(edge.id) + " is not of this partition, or not " +
                                      "below " + quote(edge.parent));
   }
-  if (found.values.size() > kMaxItems) {
+  PushedValues pushed{id_, std::move(found.values), 0, found.commit};
+  const auto ask_again = [&](const PushedQuery& less) {
     cursors = fresh_cursors();
-    found = forest.values_since(cursors, {true, {}});
-  }
-  return PushedValues{id_, std::move(found.values), 0, found.commit};
+    found = forest.values_since(cursors, less);
+    pushed.entries = std::move(found.values);
+    pushed.commit = found.commit;
+  };
+  if (pushed.entries.size() > kMaxItems) ask_again({true, {}, false, query.of_samples});
+  // One message has no room for more.
+  if (correlated_entries(pushed) > kMaxCorrelated) ask_again({true, {}});
+  return pushed;
 }
 
 PushedValues WatchedGroup::changed(const Forest& forest) {
   if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  auto found = forest.values_since(cursors_, {newest_only, {}, true});
+  auto found = forest.values_since(cursors_, {newest_only, {}, true, request_.of_samples});
   PushedValues pushed{id_, std::move(found.values), told_, found.commit};
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;

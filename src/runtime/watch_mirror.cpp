@@ -102,7 +102,8 @@ void WatchMirror::inherit(const WatchMirror& before) {
       continue;
     }
     std::vector<EdgeCursor> nothing{{own.id, own.parent}};
-    for (PushedValue& value : before.forest_.values_since(nothing, {false, time_of(0)}).values) {
+    for (PushedValue& value :
+         before.forest_.values_since(nothing, {false, time_of(0), false, true}).values) {
       value.index = i;
       values.push_back(std::move(value));
     }

@@ -7,13 +7,16 @@
 namespace tfdude {
 namespace {
 
-// What is said of a dynamic edge, without what an observation has found about one sample of it.
-Correlation said_in(const PushedValue& value) {
-  Correlation said = value.correlation;
-  if (!value.stamp) return said;
-  auto& all = said.common_errors;
-  all.erase(std::remove_if(all.begin(), all.end(), is_observed), all.end());
-  return said;
+// What an observation has found about one sample, instead of what is said of its edge.
+bool is_of_sample(const PushedValue& value) {
+  const auto& common_errors = value.correlation.common_errors;
+  return value.stamp && std::any_of(common_errors.begin(), common_errors.end(), is_observed);
+}
+
+bool is_known(const Sample& sample, const PushedValue& told, const Correlation& correlation) {
+  const SharedRevision* revision = sample.revision();
+  return same(sample.value(), told.X) &&
+         (revision != nullptr ? revision->correlation() : Correlation()) == correlation;
 }
 
 }  // namespace
@@ -33,14 +36,15 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& 
                                     bool replace) {
   const std::int64_t stamp = nanoseconds(*told.stamp);
   if (stamp < 0) return false;
-  const auto& common_errors = told.correlation.common_errors;
-  const bool observed = std::any_of(common_errors.begin(), common_errors.end(), is_observed);
+  const bool observed = is_of_sample(told);
   const SampleRevision revision{told.X, observed ? told.correlation : Correlation()};
   const GivenValue value{told.X, nullptr, observed ? &revision : nullptr};
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
-      if (!replace || same(edge.samples->sample(place)->value(), told.X)) return false;
+      if (!replace || is_known(*edge.samples->sample(place), told, revision.correlation)) {
+        return false;
+      }
       replace_sample(edge, value, stamp);
       if (observed) show_revision(edge.slot);
       return true;
@@ -105,11 +109,11 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
     if (edge == nullptr || correlated[value->index]) continue;
     if (!check_common_errors(value->correlation.common_errors)) continue;
     correlated[value->index] = true;
+    if (is_of_sample(*value)) continue;
     const Correlation before =
         edge->correlation != nullptr ? edge->correlation->said() : Correlation();
-    const Correlation said = said_in(*value);
-    if (before == said) continue;
-    impl_->say_correlation(edge->slot, said);
+    if (before == value->correlation) continue;
+    impl_->say_correlation(edge->slot, value->correlation);
     changed = true;
   }
   if (changed) impl_->commit();

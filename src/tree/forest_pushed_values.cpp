@@ -49,8 +49,6 @@ HistoryInfo history_of(const HeldVersion& edge) {
   return info;
 }
 
-// Watchers know correlations of edges, not of single samples: of a sample that was observed, they
-// get all of its covariance.
 Correlation correlation_of(const HeldVersion& edge) {
   if (edge.correlation == nullptr) return {};
   return edge.moving() ? edge.correlation->said() : edge.correlation->now();
@@ -97,8 +95,13 @@ void sort_by_stamp(std::vector<PushedValue>::iterator begin,
 // the watcher only has the poses.
 class Telling {
  public:
-  Telling(const HeldVersion& edge, std::uint32_t index, std::vector<PushedValue>& values)
-      : edge_(edge), index_(index), values_(values), begin_(values.size()) {}
+  Telling(const HeldVersion& edge, std::uint32_t index, bool of_samples,
+          std::vector<PushedValue>& values)
+      : edge_(edge),
+        index_(index),
+        of_samples_(of_samples),
+        values_(values),
+        begin_(values.size()) {}
 
   void tell(const std::optional<Time>& stamp, const Transform& X) {
     values_.push_back({index_, stamp, X, {}, edge_.history, {}});
@@ -113,9 +116,12 @@ class Telling {
 
  private:
   void tell_between(const Sample& before, const Sample& after);
+  void tell(const Sample& sample);
+  void tell_newest();
 
   const HeldVersion& edge_;
   std::uint32_t index_;
+  bool of_samples_;
   std::vector<PushedValue>& values_;
   std::size_t begin_;
 };
@@ -126,11 +132,29 @@ void Telling::tell_between(const Sample& before, const Sample& after) {
   }
 }
 
+void Telling::tell(const Sample& sample) {
+  if (!of_samples_ || !is_correlated(sample)) {
+    return tell(time_of(sample.stamp), value_of(edge_, sample));
+  }
+  tell(time_of(sample.stamp), sample.value());
+  values_.back().correlation = sample.revision()->correlation();
+}
+
+// The edge's version may be newer than the sample that it shows.
+void Telling::tell_newest() {
+  const EdgeCorrelation* correlation = edge_.correlation;
+  if (!of_samples_ || correlation == nullptr || !correlation->revised()) {
+    return tell(time_of(edge_.stamp), newest_of(edge_));
+  }
+  tell(time_of(edge_.stamp), edge_.X_PC);
+  values_.back().correlation = correlation->now();
+}
+
 void Telling::tell_newest(std::uint64_t seen) {
   const SampleHistory& samples = *edge_.samples;
   const Sample* newest = samples.sample(edge_.number);
   if (newest != nullptr && newest->commit <= seen) return;
-  tell(time_of(edge_.stamp), newest_of(edge_));
+  tell_newest();
   values_.back().made_up = samples.made_up(edge_.number);
   if (seen == 0 || newest == nullptr) return;
   const Sample* before = newest;
@@ -150,14 +174,16 @@ void Telling::tell_samples(std::uint64_t first, std::uint64_t seen) {
     if (sample == nullptr) continue;
     if (before != nullptr && (is_new(*sample) || is_new(*before))) tell_between(*before, *sample);
     if (is_new(*sample)) {
-      // The edge's version may be newer than the sample that it shows.
-      tell(time_of(sample->stamp),
-           number == edge_.number ? newest_of(edge_) : value_of(edge_, *sample));
+      if (number == edge_.number) {
+        tell_newest();
+      } else {
+        tell(*sample);
+      }
       values_.back().made_up = samples.made_up(number);
     }
     before = sample;
   }
-  if (samples.sample(edge_.number) == nullptr) tell(time_of(edge_.stamp), newest_of(edge_));
+  if (samples.sample(edge_.number) == nullptr) tell_newest();
 }
 
 void Telling::tell_no_sample(std::uint64_t seen) {
@@ -171,7 +197,7 @@ void Telling::finish(bool begins) {
   if (values_.size() == begin_) return;
   const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
   sort_by_stamp(begin, values_.end());
-  values_.back().correlation = correlation_of(edge_);
+  if (values_.back().correlation.empty()) values_.back().correlation = correlation_of(edge_);
   if (!begins) return;
   begin->process_noise =
       edge_.samples != nullptr ? edge_.samples->timing().process_noise : Covariance();
@@ -181,7 +207,7 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
                 std::uint64_t commit, EdgeCursor& cursor, std::vector<PushedValue>& values) {
   const bool begins = edge.history != cursor.history;
   const std::uint64_t seen = begins ? 0 : cursor.commit;
-  Telling telling(edge, index, values);
+  Telling telling(edge, index, query.of_samples, values);
   if (edge.lacks_sample()) {
     telling.tell_no_sample(seen);
   } else if (edge.moving() && query.newest_only) {

@@ -26,7 +26,9 @@ struct PushedValue {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
-  Correlation correlation{};  ///< of the edge; only with the last of its values
+  /// Of the edge, only with the last of its values; or of a sample that was observed
+  /// (PushedQuery::of_samples).
+  Correlation correlation{};
   /// The number of the history of this value. A new history, with a higher number, starts when an
   /// edge is moved, added again, or loses its samples.
   std::uint64_t history = 0;
@@ -65,6 +67,9 @@ struct PushedQuery {
   /// Report nothing while one of the edges is not held, or has another parent: without it, the
   /// others may be half of a commit.
   bool whole = false;
+  /// Tell how each sample is correlated that an observation has corrected. Otherwise such a sample
+  /// has all of its covariance, as a watcher of single edges needs it.
+  bool of_samples = false;
 };
 
 }  // namespace tfdude

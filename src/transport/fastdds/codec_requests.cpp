@@ -159,11 +159,24 @@ constexpr auto kLookupAt = record(
     TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(order, query.order, OrderNumber()),
     TFDUDE_FIELD_OF_ALL(edges, OfEdges()));
 
-constexpr auto kWatch = Ruled(
-    record(TFDUDE_FIELD(period, period, Duration("the period of a watch")),
-           TFDUDE_FIELD(from, from, Stamp("the instant of a watch")),
-           TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(composed, composed, Octet())),
-    &check_watch);
+// What is pushed of each segment.
+struct OfSegments : Octet {
+  static void write(const WatchRequest& watch, std::uint8_t& wire) {
+    wire = watch.of_samples ? 2 : watch.composed ? 1 : 0;
+  }
+  static Result<void> read(std::uint8_t wire, WatchRequest& watch, const Place&) {
+    watch.composed = wire == 1;
+    watch.of_samples = wire == 2;
+    return {};
+  }
+};
+
+constexpr auto kWatch =
+    Ruled(record(TFDUDE_FIELD(period, period, Duration("the period of a watch")),
+                 TFDUDE_FIELD(from, from, Stamp("the instant of a watch")),
+                 TFDUDE_FIELD(segments, segments, kSegments),
+                 TFDUDE_FIELD_OF_ALL(composed, OfSegments())),
+          &check_watch);
 
 constexpr auto kOfAll = record(TFDUDE_FIELDS(all, Octet()));
 
