@@ -128,6 +128,8 @@ void Model::move(const std::string& id, const std::string& parent,
   frame.may_move_late = frame.may_change_late = !done;
   if (done) frame.unsaved = false;
   frame.possible = std::move(after);
+  // What the frame is below now may have been undone while the move was on its way.
+  if (may_be_below(parent, id)) allow_cycles();
 }
 
 void Model::remove(const std::string& id, bool done) {
