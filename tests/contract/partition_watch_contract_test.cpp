@@ -256,7 +256,11 @@ TEST_CASE("partition watch: a listener that takes long delays nobody, and may en
   for (int i = 1; i <= 100; ++i) REQUIRE(node->update("hand", along_x(i), ms(i)));
   CHECK(client->lookup("arm", "hand"));
   blocked.unlock();
-  REQUIRE(eventually([&] { return calls == 2; }));
+  REQUIRE(eventually([&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return !watch;
+  }));
+  CHECK(calls == 2);
   REQUIRE(node->update("hand", along_x(5), ms(1000)));
   std::this_thread::sleep_for(50ms);
   CHECK(calls == 2);
