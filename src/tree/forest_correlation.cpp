@@ -222,7 +222,8 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
                                   std::int64_t stamp) {
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
-    push_value(newest.slot, value, stamp);
+    // The value is corrected already, also that of an edge that drifts.
+    push_checked(newest, value, stamp);
     return;
   }
   SampleHistory* superseded = newest.samples;
