@@ -137,13 +137,13 @@ void run(std::uint8_t choice, const Bytes& bytes) {
       (void)received<ros::wire::Odometry>(MessageType::kOdometry, bytes,
                                           ros::well_formed_odometry(data, size));
       return;
-    case 6:
+    case 5:
       return seen<ros::wire::Detections>(MessageType::kDetection3DArray, bytes,
                                          ros::well_formed_detections(data, size));
-    case 7:
+    case 6:
       return seen<ros::wire::Tags>(MessageType::kAprilTagDetectionArray, bytes,
                                    ros::well_formed_tags(data, size));
-    case 8:
+    case 7:
       return seen<ros::wire::Markers>(MessageType::kArucoMarkers, bytes,
                                       ros::well_formed_markers(data, size));
     default:
