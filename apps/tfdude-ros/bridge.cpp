@@ -19,6 +19,13 @@ std::string host_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
 }
 
+// Stamps may be those of a simulation. The import notices itself when time jumps back.
+EdgeTiming timing_of_frames(const Settings& settings) {
+  EdgeTiming timing = settings.options.history;
+  timing.max_ahead = std::chrono::nanoseconds::max();
+  return timing;
+}
+
 bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
   return partition.name == mark.partition && partition.host == mark.host &&
          partition.pid == mark.pid;
@@ -28,8 +35,7 @@ bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
 
 Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
   Options options = settings.options;
-  // Stamps may be those of a simulation. The import notices itself when time jumps back.
-  options.history.max_ahead = std::chrono::nanoseconds::max();
+  options.history = timing_of_frames(settings);
   auto node = Node::open(settings.partition, {}, options);
   if (!node) return tl::unexpected(std::move(node.error()));
   std::unique_ptr<Bridge> bridge(new Bridge(*std::move(node)));
@@ -42,12 +48,15 @@ Bridge::~Bridge() {
   changes_ = {};
   if (frames_out_) frames_out_->stop();
   if (joints_out_) joints_out_->stop();
+  if (clock_out_) clock_out_->stop();
   poses_out_.clear();
   if (description_out_) description_out_->stop();
   if (ros_ != nullptr && ros_->malformed() > 0) {
     spdlog::warn("malformed messages of ROS: {}", ros_->malformed());
   }
   ros_ = nullptr;
+  for (const auto& taker : values_in_) taker->stop();
+  for (const auto& taker : objects_in_) taker->stop();
   if (frames_in_) frames_in_->stop();
   if (joints_in_) joints_in_->stop();
   for (const auto& observer : poses_in_) observer->stop();
@@ -60,7 +69,10 @@ Result<void> Bridge::start(const Settings& settings) {
   auto ros = join_ros_domain({settings.ros_domain, settings.range, self});
   if (!ros) return tl::unexpected(std::move(ros.error()));
   ros_ = *std::move(ros);
-  if (settings.frames_in) frames_in_.emplace(node_, *settings.frames_in);
+  const bool takes_others = !settings.values_in.empty() || !settings.detections_in.empty();
+  if (settings.frames_in || takes_others) {
+    frames_in_.emplace(node_, import_of(settings), timing_of_frames(settings));
+  }
   if (settings.frames_out) frames_out_.emplace(node_, *settings.frames_out);
   if (settings.description_out) {
     description_out_.emplace(node_, *settings.description_out);
@@ -88,12 +100,20 @@ Result<void> Bridge::start_in(const Settings& settings) {
     // A node that publishes the same frames on /tf would otherwise be first.
     if (frames_in_) (void)description_in_->wait_until_served(kDescriptionFirst);
   }
-  if (frames_in_) {
+  if (settings.frames_in) {
     if (auto started = frames_in_->start(*ros_, is_own); !started) return started;
   }
   if (settings.joints_in) {
     joints_in_.emplace(node_, *settings.joints_in);
     if (auto started = joints_in_->start(*ros_, is_own); !started) return started;
+  }
+  for (const ValueIn& one : settings.values_in) {
+    values_in_.push_back(std::make_unique<ValueTaker>(node_, *frames_in_, one));
+    if (auto started = values_in_.back()->start(*ros_, is_own); !started) return started;
+  }
+  for (const DetectionsIn& one : settings.detections_in) {
+    objects_in_.push_back(std::make_unique<ObjectTaker>(node_, *frames_in_, one));
+    if (auto started = objects_in_.back()->start(*ros_, is_own); !started) return started;
   }
   for (const PoseIn& one : settings.poses_in) {
     poses_in_.push_back(std::make_unique<PoseObserver>(node_, one));
@@ -103,6 +123,10 @@ Result<void> Bridge::start_in(const Settings& settings) {
 }
 
 Result<void> Bridge::start_out(const Settings& settings) {
+  if (settings.clock_out) {
+    clock_out_.emplace(node_, *settings.clock_out);
+    if (auto started = clock_out_->start(*ros_); !started) return started;
+  }
   if (frames_out_) {
     const auto from_ros = [this] { return partitions_from_ros(); };
     if (auto started = frames_out_->start(*ros_, from_ros); !started) return started;

@@ -8,12 +8,14 @@
 
 #include "tfdude/client/node.hpp"
 
-#include "parts/clock_in.hpp"
+#include "parts/clock.hpp"
 #include "parts/description.hpp"
+#include "parts/detections.hpp"
 #include "parts/frames_in.hpp"
 #include "parts/frames_out.hpp"
 #include "parts/joints.hpp"
 #include "parts/poses.hpp"
+#include "parts/values.hpp"
 #include "ros_domain.hpp"
 #include "settings.hpp"
 
@@ -43,11 +45,14 @@ class Bridge {
 
   Node node_;
   std::optional<ClockIn> clock_in_;
+  std::optional<ClockOut> clock_out_;
   std::optional<DescriptionIn> description_in_;
   std::optional<FramesIn> frames_in_;
   std::optional<FramesOut> frames_out_;
   std::optional<JointsIn> joints_in_;
   std::optional<JointsOut> joints_out_;
+  std::vector<std::unique_ptr<ValueTaker>> values_in_;
+  std::vector<std::unique_ptr<ObjectTaker>> objects_in_;
   std::vector<std::unique_ptr<PoseObserver>> poses_in_;
   std::vector<std::unique_ptr<PoseSender>> poses_out_;
   std::optional<DescriptionOut> description_out_;

@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "tfdude/base/time.hpp"
+#include "tfdude/math/stated_covariance.hpp"
 
 // The messages of ROS 2 as plain structs: what the bridge works with, and no DDS.
 namespace tfdude::ros {
@@ -23,6 +25,8 @@ struct TransformStamped {
   std::string parent;
   std::string child;
   RosPose pose;
+  /// Of the right perturbation. /tf has none: this transform is from another topic.
+  std::optional<StatedCovariance> covariance{};
 };
 
 /// tf2_msgs/TFMessage.
@@ -58,11 +62,27 @@ struct Odometry {
   std::array<double, 36> twist_covariance{};
 };
 
+/// An object that a camera has seen.
+struct Detection {
+  std::string id;
+  RosPose pose;  ///< in the frame of the message
+  std::array<double, 36> covariance{};
+};
+
+/// vision_msgs/Detection3DArray, isaac_ros_apriltag_interfaces/AprilTagDetectionArray or
+/// ros2_aruco_interfaces/ArucoMarkers.
+struct Detections {
+  Time stamp{};
+  std::string frame;
+  std::vector<Detection> objects;
+};
+
 /// rosgraph_msgs/Clock.
 struct ClockTime {
   Time now{};
 };
 
-using Message = std::variant<TfMessage, JointState, Text, PoseWithCovariance, Odometry, ClockTime>;
+using Message =
+    std::variant<TfMessage, JointState, Text, PoseWithCovariance, Odometry, Detections, ClockTime>;
 
 }  // namespace tfdude::ros

@@ -24,4 +24,8 @@ Topic odometry_topic(const std::string& name) {
   return {name, MessageType::kOdometry, false, false, 10, 10};
 }
 
+Topic detections_topic(const std::string& name, MessageType type) {
+  return {name, type, false, false, 10, 10};
+}
+
 }  // namespace tfdude::ros

@@ -44,6 +44,9 @@ enum class MessageType : std::uint8_t {
   kString,
   kPoseWithCovarianceStamped,
   kOdometry,
+  kDetection3DArray,
+  kAprilTagDetectionArray,
+  kArucoMarkers,
   kClock,
 };
 
@@ -64,6 +67,8 @@ struct Topic {
 [[nodiscard]] Topic clock_topic();
 [[nodiscard]] Topic pose_topic(const std::string& name);
 [[nodiscard]] Topic odometry_topic(const std::string& name);
+/// @param type  one of those of detections
+[[nodiscard]] Topic detections_topic(const std::string& name, MessageType type);
 
 /// The writer of a message.
 struct Source {
@@ -96,7 +101,7 @@ class RosDomain {
 
   /// Own messages and malformed ones are left out. @return kTransport.
   [[nodiscard]] virtual Result<void> subscribe(const Topic& topic, Take take) = 0;
-  /// @return kTransport.
+  /// Not of detections. @return kTransport.
   [[nodiscard]] virtual Result<std::unique_ptr<Publisher>> advertise(const Topic& topic) = 0;
 
   /// The other bridges in this ROS domain.

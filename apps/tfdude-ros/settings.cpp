@@ -15,12 +15,22 @@ tl::unexpected<Error> bad(const char* name, const std::string& value, const char
 
 }  // namespace
 
+ImportSettings import_of(const Settings& settings) {
+  ImportSettings import = settings.frames_in.value_or(ImportSettings());
+  import.prefix = settings.prefix;
+  import.drifts = settings.drifts;
+  return import;
+}
+
 void set_prefix(const std::string& prefix, Settings& settings) {
+  settings.prefix = prefix;
   if (settings.frames_in) settings.frames_in->prefix = prefix;
   if (settings.frames_out) settings.frames_out->prefix = prefix;
   if (settings.joints_in) settings.joints_in->prefix = prefix;
   if (settings.joints_out) settings.joints_out->prefix = prefix;
   if (settings.description_in) settings.description_in->part.prefix = prefix;
+  for (ValueIn& one : settings.values_in) one.prefix = prefix;
+  for (DetectionsIn& one : settings.detections_in) one.prefix = prefix;
   for (PoseIn& one : settings.poses_in) one.prefix = prefix;
   for (PoseOut& one : settings.poses_out) one.prefix = prefix;
 }

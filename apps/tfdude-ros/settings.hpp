@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,10 +10,12 @@
 #include "tfdude/description/urdf.hpp"
 #include "tfdude/types/options.hpp"
 
+#include "logic/detections.hpp"
 #include "logic/joints.hpp"
 #include "logic/poses.hpp"
 #include "logic/tf_export.hpp"
 #include "logic/tf_import.hpp"
+#include "logic/values.hpp"
 #include "ros_domain.hpp"
 
 namespace tfdude::ros {
@@ -43,9 +46,19 @@ struct Settings {
   std::optional<DescriptionOutSettings> description_out{};
   /// The time of /clock is passed on to all who have an external clock.
   bool passes_clock = false;
+  /// How often the time of the external clock is sent to /clock [Hz].
+  std::optional<double> clock_out{};
+  std::string prefix{};  ///< of all of them
+  /// As ImportSettings::drifts, for edges of /tf and of other topics.
+  std::map<std::string, Covariance> drifts{};
+  std::vector<ValueIn> values_in{};
+  std::vector<DetectionsIn> detections_in{};
   std::vector<PoseIn> poses_in{};
   std::vector<PoseOut> poses_out{};
 };
+
+/// How the frames of ROS are taken: as for /tf, if that is taken.
+[[nodiscard]] ImportSettings import_of(const Settings& settings);
 
 /// Prepends a prefix to all names of ROS.
 void set_prefix(const std::string& prefix, Settings& settings);

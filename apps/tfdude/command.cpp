@@ -42,10 +42,13 @@ int RecordableCommand::run(const Common& common) const {
 int Question::ask(Client& client, const Common& common) const { return ask_source(client, common); }
 
 int Question::ask_recording(Recording& recorded, const Common& common) const {
-  const Source source(recorded);
+  Source source(recorded);
   const auto instant = optional_stamp(source, at);
+  const auto believed = optional_stamp(source, believed_at);
   if (!instant) return report(instant.error(), common);
+  if (!believed) return report(believed.error(), common);
   if (*instant) recorded.seek(**instant);
+  if (*believed) source.believe_as_of(**believed);
   return ask_source(source, common);
 }
 

@@ -19,6 +19,12 @@ class Source {
   /// The end of the recording is now, for stamps that count back from it.
   explicit Source(Recording& recording) : recording_(&recording), end_(recording.instant()) {}
 
+  /// From now on answers with what was known at an instant of the recording, also of others.
+  void believe_as_of(Time instant) {
+    recording_->seek(instant);
+    reads_on_ = false;
+  }
+
   [[nodiscard]] bool live() const { return client_ != nullptr; }
   /// The end of a recording.
   [[nodiscard]] Result<Time> now() const { return live() ? client_->now() : end_; }
@@ -66,6 +72,7 @@ class Source {
   Client* client_ = nullptr;
   Recording* recording_ = nullptr;
   Time end_{};
+  bool reads_on_ = true;
 };
 
 }  // namespace tfdude::cli

@@ -7,6 +7,9 @@
 //   string     TEXT up to the end of the line; or @FILE
 //   pose       STAMP FRAME x y z qx qy qz qw (36 numbers, or one that stands for all)
 //   odometry   STAMP FRAME CHILD x y z ... as pose
+//   objects    STAMP FRAME (ID x y z qx qy qz qw VARIANCE)...    Detection3DArray
+//   tags       as objects                                       AprilTagDetectionArray of Isaac ROS
+//   markers    as objects, whose variances are not sent         ArucoMarkers
 //   clock      STAMP
 
 #include <dds/dds.h>

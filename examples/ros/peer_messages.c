@@ -172,6 +172,78 @@ static void print_odometry(const char* topic, const void* sample) {
   print_pose_of(&message->pose_);
 }
 
+// x y z qx qy qz qw VARIANCE
+static void read_object(char** text, PoseWithCovariance* pose) {
+  double* numbers = &pose->pose_.position_.x_;
+  for (int i = 0; i < 7; ++i) numbers[i] = number(text);
+  const double variance = number(text);
+  for (int i = 0; i < 6; ++i) pose->covariance_[7 * i] = variance;
+}
+
+static void* parse_objects(char* text) {
+  vision_msgs_msg_dds__Detection3DArray_* message = zeros(1, sizeof *message);
+  message->header_.stamp_ = read_time(&text);
+  message->header_.frame_id_ = next(&text);
+  vision_msgs_msg_dds__Detection3D_* all = zeros(most_tokens(text), sizeof *all);
+  uint32_t count = 0;
+  for (; text != NULL && *text != 0; ++count) {
+    vision_msgs_msg_dds__ObjectHypothesisWithPose_* result = zeros(1, sizeof *result);
+    result->hypothesis_.class_id_ = next(&text);
+    read_object(&text, &result->pose_);
+    all[count].header_.frame_id_ = "";
+    all[count].id_ = "";
+    all[count].results_._maximum = all[count].results_._length = 1;
+    all[count].results_._buffer = result;
+  }
+  message->detections_._maximum = message->detections_._length = count;
+  message->detections_._buffer = all;
+  return message;
+}
+
+static void* parse_tags(char* text) {
+  isaac_ros_apriltag_interfaces_msg_dds__AprilTagDetectionArray_* message =
+      zeros(1, sizeof *message);
+  message->header_.stamp_ = read_time(&text);
+  message->header_.frame_id_ = next(&text);
+  isaac_ros_apriltag_interfaces_msg_dds__AprilTagDetection_* all =
+      zeros(most_tokens(text), sizeof *all);
+  uint32_t count = 0;
+  for (; text != NULL && *text != 0; ++count) {
+    all[count].family_ = "36h11";
+    all[count].id_ = atoi(next(&text));
+    all[count].pose_.header_ = message->header_;
+    read_object(&text, &all[count].pose_.pose_);
+  }
+  message->detections_._maximum = message->detections_._length = count;
+  message->detections_._buffer = all;
+  return message;
+}
+
+static void* parse_markers(char* text) {
+  ros2_aruco_interfaces_msg_dds__ArucoMarkers_* message = zeros(1, sizeof *message);
+  message->header_.stamp_ = read_time(&text);
+  message->header_.frame_id_ = next(&text);
+  const uint32_t most = most_tokens(text);
+  message->marker_ids_._buffer = zeros(most, sizeof(int64_t));
+  message->poses_._buffer = zeros(most, sizeof(geometry_msgs_msg_dds__Pose_));
+  uint32_t count = 0;
+  for (; text != NULL && *text != 0; ++count) {
+    message->marker_ids_._buffer[count] = atoi(next(&text));
+    PoseWithCovariance pose;
+    read_object(&text, &pose);
+    message->poses_._buffer[count] = pose.pose_;
+  }
+  message->marker_ids_._maximum = message->marker_ids_._length = count;
+  message->poses_._maximum = message->poses_._length = count;
+  return message;
+}
+
+// Nobody sends these to the peer.
+static void print_nothing(const char* topic, const void* sample) {
+  (void)topic;
+  (void)sample;
+}
+
 static void* parse_clock(char* text) {
   rosgraph_msgs_msg_dds__Clock_* message = zeros(1, sizeof *message);
   message->now_ = read_time(&text);
@@ -190,6 +262,10 @@ const Kind* find_kind(const char* name) {
       {"string", &std_msgs_msg_dds__String__desc, parse_string, print_string},
       {"pose", &geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc, parse_pose, print_pose},
       {"odometry", &nav_msgs_msg_dds__Odometry__desc, parse_odometry, print_odometry},
+      {"objects", &vision_msgs_msg_dds__Detection3DArray__desc, parse_objects, print_nothing},
+      {"tags", &isaac_ros_apriltag_interfaces_msg_dds__AprilTagDetectionArray__desc, parse_tags,
+       print_nothing},
+      {"markers", &ros2_aruco_interfaces_msg_dds__ArucoMarkers__desc, parse_markers, print_nothing},
       {"clock", &rosgraph_msgs_msg_dds__Clock__desc, parse_clock, print_clock},
   };
   for (size_t i = 0; i < sizeof kKinds / sizeof kKinds[0]; ++i) {

@@ -41,10 +41,11 @@ bool has_changed(const Belief& before, const Belief& after) {
 
 }  // namespace
 
-ObserveTask::ObserveTask(const Forest& forest, Measurement measurement, std::string source,
-                         bool asks_for_frames, const TimeLimit& limit)
+ObserveTask::ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
+                         std::string source, bool asks_for_frames, const TimeLimit& limit)
     : forest_(forest),
       measurement_(std::move(measurement)),
+      determined_(std::move(determined)),
       source_(std::move(source)),
       asks_for_frames_(asks_for_frames),
       limit_(limit) {}
@@ -126,6 +127,19 @@ Result<Task::Next> ObserveTask::values(std::vector<Reply> replies, Clock::time_p
   return observe(path_, now);
 }
 
+Result<std::vector<ObservedEdge>> ObserveTask::edges_of(const ObservedPath& path) const {
+  std::vector<ObservedEdge> edges = path.edges;
+  if (determined_.empty()) return edges;
+  for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
+    const bool is_beside = edges[k].way == ObservedEdge::Way::kBeside;
+    if (is_beside || plan_.edges[k].info.id != determined_) continue;
+    edges[k].X_PC.unspecified = true;
+    return edges;
+  }
+  return fail(Errc::kInvalidInput, "no edge of the path from " + quote(measurement_.a) + " to " +
+                                       quote(measurement_.b) + " is that of " + quote(determined_));
+}
+
 Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_point now) {
   std::vector<std::string> missing = path.missing;
   missing.erase(std::remove_if(missing.begin(), missing.end(),
@@ -157,8 +171,10 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
   const std::string source = source_ + "." + std::to_string(attempts_);
+  const auto edges = edges_of(path);
+  if (!edges) return tl::unexpected(edges.error());
   const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
-      path.edges, measurement_.X_AB, source, measurement_.options);
+      *edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);
   return fail_at("the path from " + quote(measurement_.a) + " to " + quote(measurement_.b),
                  found.error());

@@ -24,10 +24,11 @@ struct Measurement {
 /// of this again.
 class ObserveTask final : public Task {
  public:
+  /// @param determined  the frame whose edge takes all of it, whatever its value was; empty: none
   /// @param source  a name of the measurement's error that no other has
   /// @param asks_for_frames  the participant does not keep all frames
-  ObserveTask(const Forest& forest, Measurement measurement, std::string source,
-              bool asks_for_frames, const TimeLimit& limit);
+  ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
+              std::string source, bool asks_for_frames, const TimeLimit& limit);
 
   [[nodiscard]] std::vector<std::string> frames() const override;
   [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point now) override;
@@ -56,6 +57,8 @@ class ObserveTask final : public Task {
 
   [[nodiscard]] Result<Next> values(std::vector<Reply> replies, Clock::time_point now);
   [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
+  /// The edges of the path; that which the measurement determines is unspecified.
+  [[nodiscard]] Result<std::vector<ObservedEdge>> edges_of(const ObservedPath& path) const;
   [[nodiscard]] Result<Next> apply(const ObservedPath& path, const Observation& found);
   [[nodiscard]] Result<Next> first(Reply reply);
   [[nodiscard]] Result<Next> others(const std::vector<Reply>& replies);
@@ -67,6 +70,7 @@ class ObserveTask final : public Task {
 
   const Forest& forest_;
   const Measurement measurement_;
+  const std::string determined_;
   const std::string source_;
   const bool asks_for_frames_;
   const TimeLimit limit_;

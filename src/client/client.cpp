@@ -348,8 +348,15 @@ Result<PartitionWatch> Client::watch_partition(const std::string& partition,
 
 Result<Observed> Client::observe(const std::string& a, const std::string& b, const Transform& X_AB,
                                  std::optional<Time> stamp, const ObserveOptions& options) {
-  return participant_->observations().observe(a, b, X_AB, stamp, options,
+  return participant_->observations().observe({a, b, X_AB, stamp, options},
                                               participant_->discovery().call_deadline());
+}
+
+Result<Observed> Client::determine(const std::string& id, const std::string& a,
+                                   const std::string& b, const Transform& X_AB,
+                                   std::optional<Time> stamp) {
+  const Deadline deadline = participant_->discovery().call_deadline();
+  return participant_->observations().determine(id, {a, b, X_AB, stamp, {1.0, true}}, deadline);
 }
 
 Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
@@ -360,7 +367,7 @@ Result<Observed> Client::fuse(const std::string& id, const Transform& X_PC,
   if (edge->parent.empty()) {
     return fail(Errc::kInvalidInput, "frame " + quote(id) + " is a root: it has no edge");
   }
-  return participant_->observations().observe(edge->parent, id, X_PC, stamp, options, deadline);
+  return participant_->observations().observe({edge->parent, id, X_PC, stamp, options}, deadline);
 }
 
 Result<void> Client::correlate(const std::string& id, const Correlation& correlation) {

@@ -45,6 +45,10 @@ Result<void> Node::clear_history(const std::string& id) {
 
 std::size_t Node::clear_history() { return participant_->forest().clear_histories(Time::min()); }
 
+Result<void> Node::set_timing(const std::string& id, const EdgeTiming& timing) {
+  return participant_->forest().set_timing(id, timing);
+}
+
 void Node::show_joints(std::vector<JointInfo> joints) {
   participant_->member().show(std::move(joints));
 }

@@ -54,6 +54,10 @@ Result<StampedTransform> EdgesWatch::lookup(std::string_view a, std::string_view
   return edges_->lookup(a, b, query);
 }
 
+std::vector<Time> EdgesWatch::stamps(std::string_view id, Time after) const {
+  return edges_->stamps(id, after);
+}
+
 Result<void> EdgesWatch::health() const { return edges_->health(); }
 
 std::uint64_t EdgesWatch::messages() const { return edges_->messages(); }

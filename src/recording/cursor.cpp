@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "types/ros_tf.hpp"
 
 namespace tfdude::recording {
@@ -155,8 +157,15 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
       if (!foreign_) return {};
       auto transforms = decode_tf(message.data);
       if (!transforms) return tl::unexpected(std::move(transforms.error()));
-      if (topic == Topic::kTfStatic) {
-        for (RecordedValue& value : transforms->values) value.value.stamp.reset();
+      for (RecordedValue& value : transforms->values) {
+        if (topic == Topic::kTfStatic) {
+          value.value.stamp.reset();
+        } else if (value.value.stamp == Time()) {
+          // Nobody has set it. As in the bridge, the value is one of the time of its arrival.
+          value.value.stamp = log_of(message);
+          note("frame " + quote(value.edge.id) +
+               ": its messages have no stamp (0): taken as of the time when they were logged");
+        }
       }
       left_out_ += transforms->left_out.size();
       for (std::string& why : transforms->left_out) note(std::move(why));

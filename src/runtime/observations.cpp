@@ -3,18 +3,16 @@
 #include <unistd.h>
 #include <utility>
 
-#include "calls/observe_task.hpp"
 #include "runtime/wall_clock.hpp"
 
 namespace tfdude {
 
-Result<Observed> Observations::observe(const std::string& a, const std::string& b,
-                                       const Transform& X_AB, std::optional<Time> stamp,
-                                       const ObserveOptions& options, const Deadline& deadline) {
-  if (auto ok = check_finite(X_AB); !ok) return fail_at("the measurement", ok.error());
+Result<Observed> Observations::determine(const std::string& id, const Measurement& measured,
+                                         const Deadline& deadline) {
+  if (auto ok = check_finite(measured.X_AB); !ok) return fail_at("the measurement", ok.error());
   std::string source = std::string(kObservedPrefix) + std::to_string(nanoseconds(wall_clock())) +
                        "." + std::to_string(getpid()) + "." + std::to_string(++count_);
-  ObserveTask task(structure_.forest, {a, b, X_AB, stamp, options}, std::move(source),
+  ObserveTask task(structure_.forest, measured, id, std::move(source),
                    requests_.on_demand() != nullptr, deadline);
   auto applied = requests_.run(task, deadline);
   if (!applied) return tl::unexpected(std::move(applied.error()));

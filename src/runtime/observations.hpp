@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "calls/observe_task.hpp"
 #include "runtime/context.hpp"
 #include "runtime/requests.hpp"
 
@@ -19,9 +20,12 @@ class Observations {
   explicit Observations(const Context& context)
       : structure_(context.structure), discovery_(context.discovery), requests_(context.requests) {}
 
-  [[nodiscard]] Result<Observed> observe(const std::string& a, const std::string& b,
-                                         const Transform& X_AB, std::optional<Time> stamp,
-                                         const ObserveOptions& options, const Deadline& deadline);
+  [[nodiscard]] Result<Observed> observe(const Measurement& measured, const Deadline& deadline) {
+    return determine({}, measured, deadline);
+  }
+  /// @param id  the frame whose edge takes all of it; empty: all edges take their shares
+  [[nodiscard]] Result<Observed> determine(const std::string& id, const Measurement& measured,
+                                           const Deadline& deadline);
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
  private:

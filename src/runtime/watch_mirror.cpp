@@ -114,6 +114,19 @@ void WatchMirror::inherit(const WatchMirror& before) {
   forest_.take(handles_, values);
 }
 
+std::vector<Time> WatchMirror::stamps(std::string_view id, Time after) const {
+  std::vector<Time> stamps;
+  const auto edge = std::find_if(route_.edges.begin(), route_.edges.end(),
+                                 [&](const FrameInfo& one) { return one.id == id; });
+  if (edge == route_.edges.end()) return stamps;
+  std::vector<EdgeCursor> nothing{{edge->id, edge->parent}};
+  for (const PushedValue& value : forest_.values_since(nothing, {false, after}).values) {
+    if (value.stamp && *value.stamp > after) stamps.push_back(*value.stamp);
+  }
+  std::sort(stamps.begin(), stamps.end());
+  return stamps;
+}
+
 std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedValue entry,
                                                  bool follows_on) {
   if (entry.index >= source.edges.size()) return std::nullopt;

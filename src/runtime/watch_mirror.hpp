@@ -65,6 +65,9 @@ class WatchMirror {
     return forest_.lookup(a, b, query);
   }
 
+  /// The stamps of an edge's samples after an instant, in order.
+  [[nodiscard]] std::vector<Time> stamps(std::string_view id, Time after) const;
+
   [[nodiscard]] const WatchRoute& route() const { return route_; }
 
   /// Whether values of this group belong to it.

@@ -93,6 +93,11 @@ bool WatchedPath::has_data(const Query& query) const {
   return mirror != nullptr && mirror->lookup(query).has_value();
 }
 
+std::vector<Time> WatchedPath::stamps(std::string_view id, Time after) const {
+  const Lock lock(mutex_);
+  return followed_ != nullptr ? followed_->stamps(id, after) : std::vector<Time>();
+}
+
 Result<void> WatchedPath::health() const {
   const Lock lock(mutex_);
   if (followed_ == nullptr) return tl::unexpected(why_not_);

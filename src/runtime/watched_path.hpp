@@ -53,6 +53,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query) const;
 
+  /// See EdgesWatch::stamps().
+  [[nodiscard]] std::vector<Time> stamps(std::string_view id, Time after) const;
+
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;

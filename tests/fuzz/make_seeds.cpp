@@ -44,11 +44,43 @@ void write_samples(const std::filesystem::path& folder) {
 }
 
 // The first byte is the type.
-template <class Message>
-void write_ros(const std::filesystem::path& folder, ros::MessageType type, const Message& message) {
-  Bytes bytes = ros::bytes_of(type, ros::generated(message));
+template <class Generated>
+void write_wire(const std::filesystem::path& folder, ros::MessageType type,
+                const Generated& message) {
+  Bytes bytes = ros::bytes_of(type, message);
   bytes.insert(bytes.begin(), static_cast<std::uint8_t>(type));
   write(folder / "ros", std::to_string(bytes.front()), bytes);
+}
+
+template <class Message>
+void write_ros(const std::filesystem::path& folder, ros::MessageType type, const Message& message) {
+  write_wire(folder, type, ros::generated(message));
+}
+
+// Those that are only read.
+void write_detections(const std::filesystem::path& folder) {
+  using ros::MessageType;
+  ros::wire::Detections objects;
+  objects.header_().frame_id_("camera");
+  objects.detections_().resize(2);
+  objects.detections_()[0].results_().resize(1);
+  objects.detections_()[0].results_()[0].hypothesis_().class_id_("cup");
+  objects.detections_()[0].results_()[0].pose_().pose_().orientation_().w_(1);
+  objects.detections_()[1].id_("track 5");
+  write_wire(folder, MessageType::kDetection3DArray, objects);
+  ros::wire::Tags tags;
+  tags.header_().frame_id_("camera");
+  tags.detections_().resize(1);
+  tags.detections_()[0].family_("36h11");
+  tags.detections_()[0].id_(7);
+  tags.detections_()[0].pose_().pose_().pose_().orientation_().w_(1);
+  write_wire(folder, MessageType::kAprilTagDetectionArray, tags);
+  ros::wire::Markers markers;
+  markers.header_().frame_id_("camera");
+  markers.marker_ids_({5});
+  markers.poses_().resize(1);
+  markers.poses_()[0].orientation_().w_(1);
+  write_wire(folder, MessageType::kArucoMarkers, markers);
 }
 
 void write_ros(const std::filesystem::path& folder) {
@@ -64,6 +96,7 @@ void write_ros(const std::filesystem::path& folder) {
   write_ros(folder, MessageType::kPoseWithCovarianceStamped, measured);
   write_ros(folder, MessageType::kOdometry, ros::Odometry{measured, "base", {1, 0, 0}, {}, {}});
   write_ros(folder, MessageType::kClock, ros::ClockTime{time_of(4)});
+  write_detections(folder);
 }
 
 void write_choices(const std::filesystem::path& folder) {

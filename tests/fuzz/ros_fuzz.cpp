@@ -11,6 +11,7 @@
 #include "ros/ros_bytes.hpp"
 #include "tfdude-ros/fastdds/convert.hpp"
 #include "tfdude-ros/fastdds/well_formed.hpp"
+#include "tfdude-ros/logic/detections.hpp"
 #include "tfdude-ros/logic/joints.hpp"
 #include "tfdude-ros/logic/tf_import.hpp"
 
@@ -92,10 +93,26 @@ void import(const ros::JointState& message) {
   }
 }
 
+/// Messages that are only read.
+template <class Wire>
+void seen(MessageType type, const Bytes& bytes, bool well_formed) {
+  Wire fresh;
+  const bool taken = ros::read(type, bytes, fresh);
+  demand(!taken || well_formed, "what is not well formed is rejected");
+  if (!taken) return;
+  ros::DetectionsIn settings;
+  settings.frame = "tag_{}";
+  settings.variances.stddev.emplace();
+  for (const auto& one : ros::DetectionImport(settings).take(ros::plain(fresh)).all) {
+    demand(check_id(one.measurement.b, "id").has_value(), "an object has a valid id");
+    demand_finite(one.measurement.X_AB);
+  }
+}
+
 void run(std::uint8_t choice, const Bytes& bytes) {
   const std::uint8_t* data = bytes.data();
   const std::size_t size = bytes.size();
-  switch (choice % 6) {
+  switch (choice % 9) {
     case 0:
       if (const auto tf =
               received<ros::wire::Tf>(MessageType::kTf, bytes, ros::well_formed_tf(data, size))) {
@@ -120,6 +137,15 @@ void run(std::uint8_t choice, const Bytes& bytes) {
       (void)received<ros::wire::Odometry>(MessageType::kOdometry, bytes,
                                           ros::well_formed_odometry(data, size));
       return;
+    case 5:
+      return seen<ros::wire::Detections>(MessageType::kDetection3DArray, bytes,
+                                         ros::well_formed_detections(data, size));
+    case 6:
+      return seen<ros::wire::Tags>(MessageType::kAprilTagDetectionArray, bytes,
+                                   ros::well_formed_tags(data, size));
+    case 7:
+      return seen<ros::wire::Markers>(MessageType::kArucoMarkers, bytes,
+                                      ros::well_formed_markers(data, size));
     default:
       (void)received<ros::wire::Clock>(MessageType::kClock, bytes,
                                        ros::well_formed_clock(data, size));

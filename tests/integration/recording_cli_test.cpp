@@ -79,6 +79,31 @@ std::vector<Time> move_arm(const ThesisDaemons& d) {
 
 }  // namespace
 
+TEST_CASE("record: what was believed of an instant before a late sample came can be asked") {
+  const ThesisDaemons d;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/robot.mcap";
+  const Process recorder = d.domain.start_cli({"record", file});
+  REQUIRE(eventually([&] { return d.domain.cli({"info", file}).status == 0; }));
+  const auto stamps = move_arm(d);
+  REQUIRE(eventually([&] { return has_sample(d, file, stamps.back()); }));
+  const std::string before = seconds(now());
+  const std::string between = seconds(stamps[1] + (stamps[2] - stamps[1]) / 2);
+  (void)text(d, {"update", "arm_1", "--xyz", "5", "0", "0", "--stamp", between});
+  const auto x = [&](const Arguments& more) {
+    Arguments arguments{"--json", "lookup", "robot_1", "arm_1", "--at", between};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const CliResult result = d.domain.cli(of_file(arguments, file));
+    return result.status == 0 ? json::parse(result.out).at("translation").at(0).get<double>() : -1;
+  };
+  REQUIRE(eventually([&] { return x({"--believed-at", seconds(now())}) == 5; }));
+  CHECK(std::abs(x({"--believed-at", before}) - 0.15) < 0.05);
+  CHECK(std::abs(x({}) - 0.15) < 0.05);
+  // What was not known yet is not read on for.
+  CHECK(x({"--believed-at", seconds(stamps[0])}) == -1);
+  CHECK(d.domain.cli({"lookup", "robot_1", "arm_1", "--believed-at", "-1"}).status == 2);
+}
+
 TEST_CASE("record: a killed recorder leaves a file that answers as the live system did") {
   const ThesisDaemons d;
   const TemporaryDirectory directory;

@@ -92,6 +92,72 @@ TEST_CASE("ros config: the description may be that of a partition") {
   CHECK_THAT(error_of("description_out: {file: a}\n"), ContainsSubstring("unknown key"));
 }
 
+TEST_CASE("ros config: values, objects, and how to read their covariances") {
+  Settings settings;
+  const auto read = parse_config(R"(
+prefix: r1/
+tf_in: {except: [x]}
+drifts: {base_link: [0.1, 0.1, 0, 0, 0, 0.2], /wheel: [0, 0, 0, 0, 0, 0.3]}
+values_in:
+  - {topic: /odom, type: odometry}
+  - topic: /amcl_pose
+    child: base_link
+    edge: odom
+    covariance: {all_zero: exact, zero: none, minus_one: none, none_from: 9999,
+                 per_metre: [0, 0, 0.1, 0, 0, 0]}
+poses_in: [{topic: /gps, child: base_link, covariance: {stddev: [1, 1, 2, 3, 3, 3]}}]
+detections_in:
+  - {topic: /tags, type: isaac_apriltag, ids: ["7"], except: ["70"], under: odom, gate: 0.9,
+     drop_after: 5, frame: "t{}"}
+  - {topic: /tf, type: tf, ids: ["tag36h11:*"]}
+  - {topic: /markers, type: aruco}
+)",
+                                 "f", settings);
+  REQUIRE(read);
+  CHECK(import_of(settings).prefix == "r1/");
+  CHECK(import_of(settings).drifts.at("base_link").upper() ==
+        Covariance::from_stddev({0.1, 0.1, 0, 0, 0, 0.2})->upper());
+  CHECK(import_of(settings).drifts.count("wheel") == 1);
+  CHECK(!import_of(settings).frames.takes("x"));
+  REQUIRE(settings.values_in.size() == 2);
+  CHECK(settings.values_in[0].odometry);
+  CHECK(settings.values_in[0].prefix == "r1/");
+  const ValueIn& amcl = settings.values_in[1];
+  CHECK(amcl.edge == "odom");
+  CHECK(amcl.variances.all_zero_is_exact);
+  CHECK(amcl.variances.zero_is_none);
+  CHECK(amcl.variances.minus_one_is_none);
+  CHECK(amcl.variances.none_from == 9999);
+  REQUIRE(amcl.variances.stddev);
+  CHECK(amcl.variances.stddev->per_metre[2] == 0.1);
+  CHECK(settings.poses_in[0].variances.stddev->constant[2] == 2);
+  REQUIRE(settings.detections_in.size() == 3);
+  const DetectionsIn& tags = settings.detections_in[0];
+  CHECK(tags.type == MessageType::kAprilTagDetectionArray);
+  CHECK(tags.ids.takes("7"));
+  CHECK(!tags.ids.takes("70"));
+  CHECK(tags.under == "odom");
+  CHECK(tags.options.gate == 0.9);
+  CHECK(tags.drop_after == 5.0);
+  CHECK(tags.frame == "t{}");
+  CHECK(tags.prefix == "r1/");
+  CHECK(settings.detections_in[1].frame == "{}");
+  CHECK(settings.detections_in[2].frame == "tag_{}");
+
+  CHECK_THAT(error_of("values_in: [{topic: /p}]\n"), ContainsSubstring("child is missing"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, child: a, edge: a}]\n"),
+             ContainsSubstring("leave it out"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, child: a, covariance: {zero: odd}}]\n"),
+             ContainsSubstring("covariance: zero is neither exact nor none"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, child: a, covariance: {stddev: [1]}}]\n"),
+             ContainsSubstring("not 6 numbers"));
+  CHECK_THAT(error_of("drifts: {base: [1, 1, 1, 1, 1, -1]}\n"), ContainsSubstring("drifts"));
+  CHECK_THAT(error_of("detections_in: [{topic: /tf, type: tf}]\n"),
+             ContainsSubstring("ids is missing"));
+  CHECK_THAT(error_of("detections_in: [{topic: /t, type: dots}]\n"),
+             ContainsSubstring("type is none of"));
+}
+
 TEST_CASE("ros config: what is left out stays as it is") {
   Settings settings;
   REQUIRE(parse_config("partition: x\n", "f", settings));
@@ -116,6 +182,9 @@ TEST_CASE("ros config: mistakes are named with their line") {
   CHECK_THAT(error_of("description_in: {partition: 'a,b'}\n"), ContainsSubstring("description_in"));
   CHECK_THAT(error_of("tf_in: {covariance: large}\n"), ContainsSubstring("covariance"));
   CHECK_THAT(error_of("a: [\n"), ContainsSubstring("not YAML"));
+  CHECK_THAT(error_of("clock_out: {}\n"), ContainsSubstring("clock_out needs clock: external"));
+  CHECK_THAT(error_of("clock: ros\nclock_out: {}\n"), ContainsSubstring("needs clock: external"));
+  CHECK(error_of("clock: external\nclock_out: {rate: 5}\n").empty());
   CHECK_THAT(error_of("clock: sundial\n"), ContainsSubstring("bridge.yaml:1: clock must be"));
   CHECK_THAT(error_of(""), ContainsSubstring("is empty"));
 }

@@ -134,7 +134,8 @@ TEST_CASE("ros poses: a message without a usable covariance is no measurement") 
   message.covariance[0] = -1;
   CHECK_THAT(why(), ContainsSubstring("has none"));
   message.covariance[0] = std::numeric_limits<double>::max();
-  CHECK_THAT(why(), ContainsSubstring("covariance[") && ContainsSubstring("beyond 1e18"));
+  // Such a variance says nothing of its axis, which is no error.
+  CHECK(measurement_of(kIn, message, "tool"));
   message.covariance[0] = 1;
   message.pose.quat = {};
   CHECK_THAT(why(), ContainsSubstring("quaternion"));

@@ -305,6 +305,27 @@ TEST_CASE("ros robot: the clock of ROS is that of those who have an external clo
   }));
 }
 
+TEST_CASE("ros robot: the clock of a simulator in tf-dude is that of ROS") {
+  const RosRig rig;
+  const testing::TemporaryDirectory files;
+  const auto bridge = rig.start_bridge(
+      {"--config", files.write("b.yaml", "clock: external\nclock_out: {rate: 100}\n")});
+  auto options = rig.dude().options();
+  options.clock = ClockKind::kExternal;
+  Client simulator = Client::open(options).value();
+  RosPeer peer(rig.ros_domain());
+  peer.obey("listen /clock clock best_effort");
+  for (const std::int64_t ns : {5'000'000'000LL, 6'000'000'000LL, 1'000'000'000LL}) {
+    const std::string text = std::to_string(ns);
+    REQUIRE(eventually([&] {
+      REQUIRE(simulator.publish_clock(time_of(ns)));
+      return peer.try_next("/clock ") == text;
+    }));
+    // While it stands still, it is sent again.
+    CHECK(peer.next("/clock ") == text);
+  }
+}
+
 TEST_CASE("ros robot: odometry of a moving frame is sent with its velocity") {
   const RosRig rig;
   const Covariance small = *Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4});

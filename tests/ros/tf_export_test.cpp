@@ -1,5 +1,6 @@
 #include "tfdude-ros/logic/tf_export.hpp"
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -145,6 +146,34 @@ TEST_CASE("ros export: a change of one static edge sends those of all groups") {
   CHECK(sent.all_static(at(9)).size() == 1);
   CHECK(sent.erase_static(2));
   CHECK(!sent.erase_static(1));
+}
+
+TEST_CASE("ros export: samples that arrive together are all sent, in order") {
+  SentFrames sent;
+  const std::vector<ExportEdge> edges{{"a", "c", "a", "c", false, {"c", "b"}}};
+  const std::map<std::string, std::vector<Time>> all{{"b", {at(2), at(4)}},
+                                                     {"c", {at(1), at(2), at(3), at(5)}}};
+  const auto stamps = [&](const std::string& id, Time after) {
+    std::vector<Time> later;
+    for (const Time one : all.at(id)) {
+      if (one > after) later.push_back(one);
+    }
+    return later;
+  };
+  const auto lookup = [](const ExportEdge&, Time instant) -> Result<StampedTransform> {
+    if (instant == at(3)) return fail(Errc::kTooOld, "dropped meanwhile");
+    return value(7, instant);
+  };
+  // What was before the first message is not sent.
+  CHECK(sent.between(edges, {value(1, at(1))}, stamps, lookup).empty());
+  CHECK(sent.changed(edges, {value(1, at(1))}).size() == 1);
+  const auto between = sent.between(edges, {value(1, at(5))}, stamps, lookup);
+  REQUIRE(between.size() == 2);
+  CHECK(between[0].stamp == at(2));
+  CHECK(between[1].stamp == at(4));
+  CHECK(between[0].child == "c");
+  CHECK(sent.changed(edges, {value(1, at(5))}).size() == 1);
+  CHECK(sent.between(edges, {value(1, at(5))}, stamps, lookup).empty());
 }
 
 }  // namespace tfdude::ros

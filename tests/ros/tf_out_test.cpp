@@ -87,6 +87,39 @@ TEST_CASE("ros tf out: dynamic and static frames of a partition reach a late pee
   CHECK(left.count("camera") == 1);
 }
 
+TEST_CASE("ros tf out: all samples that an owner has pushed at once are sent") {
+  const RosRig rig;
+  Node node =
+      Node::open("robot", {{"world", "", {}}, {"base", "world", pose(1, 0)}}, rig.dude().options())
+          .value();
+  const testing::TemporaryDirectory files;
+  const auto bridge = rig.start_bridge(
+      {"--config", files.write("b.yaml", "tf_out: {partitions: [robot], rate: 0}\n")});
+  RosPeer peer(rig.ros_domain());
+  peer.obey("listen /tf tf reliable");
+  int n = 0;
+  REQUIRE(eventually([&] {
+    ++n;
+    REQUIRE(node.update("base", pose(n, 0.25), at(n)));
+    return peer.try_next("/tf ").has_value();
+  }));
+  // Faster than anybody reads.
+  constexpr int kSamples = 40;
+  for (int i = 0; i < kSamples; ++i) {
+    REQUIRE(node.update("base", pose(i, 0.5), at(n + 1 + 0.001 * i)));
+  }
+  std::vector<Time> stamps;
+  while (stamps.empty() || stamps.back() != at(n + 1 + 0.001 * (kSamples - 1))) {
+    for (const auto& one : parse_tf(peer.next("/tf "))) {
+      if (one.stamp > at(n)) stamps.push_back(one.stamp);
+    }
+  }
+  REQUIRE(stamps.size() == kSamples);
+  for (int i = 0; i < kSamples; ++i) {
+    CHECK(stamps[static_cast<std::size_t>(i)] == at(n + 1 + 0.001 * i));
+  }
+}
+
 TEST_CASE("ros tf out: frames of an owner that is not reachable are not sent, until it returns") {
   const RosRig rig;
   const testing::TemporaryDirectory files;

@@ -89,6 +89,67 @@ TEST_CASE("ros wire: the other messages survive the way, and damaged ones are re
   check_robust(MessageType::kClock, generated(ClockTime{time_of(9)}));
 }
 
+TEST_CASE("ros wire: an object of Detection3DArray is its track, or its most probable class") {
+  wire::Detections message;
+  message.header_().frame_id_("camera");
+  message.header_().stamp_().sec_(7);
+  message.detections_().resize(3);
+  auto& first = message.detections_()[0];
+  first.results_().resize(2);
+  first.results_()[0].hypothesis_().class_id_("bowl");
+  first.results_()[0].hypothesis_().score_(0.25);
+  first.results_()[1].hypothesis_().class_id_("cup");
+  first.results_()[1].hypothesis_().score_(0.75);
+  first.results_()[1].pose_().pose_().position_().z_(3);
+  first.results_()[1].pose_().covariance_()[35] = 4;
+  message.detections_()[1] = first;
+  message.detections_()[1].id_("track 5");
+  wire::Detections back;
+  REQUIRE(read(MessageType::kDetection3DArray, bytes_of(MessageType::kDetection3DArray, message),
+               back));
+  const auto out = plain(back);
+  CHECK(out.frame == "camera");
+  CHECK(out.stamp == time_of(7'000'000'000));
+  REQUIRE(out.objects.size() == 2);  // one says nothing
+  CHECK(out.objects[0].id == "cup");
+  CHECK(out.objects[0].pose.xyz[2] == 3);
+  CHECK(out.objects[0].covariance[35] == 4);
+  CHECK(out.objects[1].id == "track 5");
+  check_robust(MessageType::kDetection3DArray, message);
+}
+
+TEST_CASE("ros wire: tags and markers are objects by their numbers") {
+  wire::Tags tags;
+  tags.header_().frame_id_("camera");
+  tags.detections_().resize(2);
+  tags.detections_()[1].family_("36h11");
+  tags.detections_()[1].id_(7);
+  tags.detections_()[1].pose_().pose_().pose_().position_().x_(2);
+  tags.detections_()[1].pose_().pose_().covariance_()[0] = 0.5;
+  wire::Tags tags_back;
+  const MessageType type = MessageType::kAprilTagDetectionArray;
+  REQUIRE(read(type, bytes_of(type, tags), tags_back));
+  const auto out = plain(tags_back);
+  REQUIRE(out.objects.size() == 2);
+  CHECK(out.objects[1].id == "7");
+  CHECK(out.objects[1].pose.xyz[0] == 2);
+  CHECK(out.objects[1].covariance[0] == 0.5);
+  check_robust(type, tags);
+
+  wire::Markers markers;
+  markers.marker_ids_({5, -1});
+  markers.poses_().resize(1);
+  markers.poses_()[0].position_().y_(4);
+  wire::Markers markers_back;
+  REQUIRE(read(MessageType::kArucoMarkers, bytes_of(MessageType::kArucoMarkers, markers),
+               markers_back));
+  const auto seen = plain(markers_back);
+  REQUIRE(seen.objects.size() == 1);
+  CHECK(seen.objects[0].id == "5");
+  CHECK(seen.objects[0].pose.xyz[1] == 4);
+  check_robust(MessageType::kArucoMarkers, markers);
+}
+
 TEST_CASE("ros wire: types have the names that ROS 2 gives them") {
   const auto name = [](MessageType type) { return type_support(type).get_type_name(); };
   CHECK(name(MessageType::kTf) == "tf2_msgs::msg::dds_::TFMessage_");
@@ -97,6 +158,10 @@ TEST_CASE("ros wire: types have the names that ROS 2 gives them") {
   CHECK(name(MessageType::kPoseWithCovarianceStamped) ==
         "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
   CHECK(name(MessageType::kOdometry) == "nav_msgs::msg::dds_::Odometry_");
+  CHECK(name(MessageType::kDetection3DArray) == "vision_msgs::msg::dds_::Detection3DArray_");
+  CHECK(name(MessageType::kAprilTagDetectionArray) ==
+        "isaac_ros_apriltag_interfaces::msg::dds_::AprilTagDetectionArray_");
+  CHECK(name(MessageType::kArucoMarkers) == "ros2_aruco_interfaces::msg::dds_::ArucoMarkers_");
   CHECK(name(MessageType::kClock) == "rosgraph_msgs::msg::dds_::Clock_");
 }
 

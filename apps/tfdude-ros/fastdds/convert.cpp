@@ -1,5 +1,6 @@
 #include "convert.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace tfdude::ros {
@@ -94,6 +95,50 @@ Odometry plain(wire::Odometry& message) {
           {twist.linear_().x_(), twist.linear_().y_(), twist.linear_().z_()},
           {twist.angular_().x_(), twist.angular_().y_(), twist.angular_().z_()},
           message.twist_().covariance_()};
+}
+
+Detections plain(wire::Detections& message) {
+  Detections out{
+      plain_time(message.header_().stamp_()), std::move(message.header_().frame_id_()), {}};
+  for (auto& one : message.detections_()) {
+    if (out.frame.empty()) out.frame = one.header_().frame_id_();
+    auto& results = one.results_();
+    const auto best =
+        std::max_element(results.begin(), results.end(), [](const auto& a, const auto& b) {
+          return a.hypothesis_().score_() < b.hypothesis_().score_();
+        });
+    if (best == results.end()) continue;
+    const auto& pose = best->pose_().pose_();
+    std::string& id = one.id_().empty() ? best->hypothesis_().class_id_() : one.id_();
+    out.objects.push_back({std::move(id), plain_pose(pose.position_(), pose.orientation_()),
+                           best->pose_().covariance_()});
+  }
+  return out;
+}
+
+Detections plain(wire::Tags& message) {
+  Detections out{
+      plain_time(message.header_().stamp_()), std::move(message.header_().frame_id_()), {}};
+  for (const auto& one : message.detections_()) {
+    const auto& pose = one.pose_().pose_();
+    out.objects.push_back({std::to_string(one.id_()),
+                           plain_pose(pose.pose_().position_(), pose.pose_().orientation_()),
+                           pose.covariance_()});
+  }
+  return out;
+}
+
+Detections plain(wire::Markers& message) {
+  Detections out{
+      plain_time(message.header_().stamp_()), std::move(message.header_().frame_id_()), {}};
+  const std::size_t count = std::min(message.marker_ids_().size(), message.poses_().size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& pose = message.poses_()[i];
+    out.objects.push_back({std::to_string(message.marker_ids_()[i]),
+                           plain_pose(pose.position_(), pose.orientation_()),
+                           {}});
+  }
+  return out;
 }
 
 ClockTime plain(wire::Clock& message) { return {plain_time(message.now_())}; }

@@ -13,6 +13,9 @@ using JointState = sensor_msgs::msg::dds_::JointState_;
 using String = std_msgs::msg::dds_::String_;
 using Pose = geometry_msgs::msg::dds_::PoseWithCovarianceStamped_;
 using Odometry = nav_msgs::msg::dds_::Odometry_;
+using Detections = vision_msgs::msg::dds_::Detection3DArray_;
+using Tags = isaac_ros_apriltag_interfaces::msg::dds_::AprilTagDetectionArray_;
+using Markers = ros2_aruco_interfaces::msg::dds_::ArucoMarkers_;
 using Clock = rosgraph_msgs::msg::dds_::Clock_;
 }  // namespace wire
 
@@ -21,6 +24,11 @@ using Clock = rosgraph_msgs::msg::dds_::Clock_;
 [[nodiscard]] Text plain(wire::String& message);
 [[nodiscard]] PoseWithCovariance plain(wire::Pose& message);
 [[nodiscard]] Odometry plain(wire::Odometry& message);
+/// An object's id is that of its track; without one, its most probable class.
+[[nodiscard]] Detections plain(wire::Detections& message);
+[[nodiscard]] Detections plain(wire::Tags& message);
+/// Without the ids that have no pose.
+[[nodiscard]] Detections plain(wire::Markers& message);
 [[nodiscard]] ClockTime plain(wire::Clock& message);
 
 [[nodiscard]] wire::Tf generated(const TfMessage& message);

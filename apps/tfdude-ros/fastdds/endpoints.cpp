@@ -1,5 +1,6 @@
 #include "endpoints.hpp"
 
+#include <type_traits>
 #include <utility>
 
 #include "convert.hpp"
@@ -33,6 +34,17 @@ using OdometryKind =
 using ClockKind =
     Kind<wire::Clock, ClockTime, rosgraph_msgs::msg::dds_::Clock_PubSubType, well_formed_clock>;
 
+// Those that are only read.
+using DetectionsKind =
+    Kind<wire::Detections, Detections, vision_msgs::msg::dds_::Detection3DArray_PubSubType,
+         well_formed_detections>;
+using TagsKind = Kind<wire::Tags, Detections,
+                      isaac_ros_apriltag_interfaces::msg::dds_::AprilTagDetectionArray_PubSubType,
+                      well_formed_tags>;
+using MarkersKind =
+    Kind<wire::Markers, Detections, ros2_aruco_interfaces::msg::dds_::ArucoMarkers_PubSubType,
+         well_formed_markers>;
+
 // Calls a function with a value of the Kind of this type.
 template <class Call>
 auto with_kind(MessageType type, Call call) {
@@ -47,6 +59,12 @@ auto with_kind(MessageType type, Call call) {
       return call(PoseKind{});
     case MessageType::kOdometry:
       return call(OdometryKind{});
+    case MessageType::kDetection3DArray:
+      return call(DetectionsKind{});
+    case MessageType::kAprilTagDetectionArray:
+      return call(TagsKind{});
+    case MessageType::kArucoMarkers:
+      return call(MarkersKind{});
     default:
       return call(ClockKind{});
   }
@@ -112,7 +130,11 @@ std::unique_ptr<edds::DataReaderListener> reading(MessageType type, Take take,
 std::unique_ptr<Publisher> writing(MessageType type, edds::Publisher& publisher,
                                    edds::DataWriter& writer) {
   return with_kind(type, [&](auto kind) -> std::unique_ptr<Publisher> {
-    return std::make_unique<Writing<decltype(kind)>>(publisher, writer);
+    if constexpr (std::is_same_v<typename decltype(kind)::Plain, Detections>) {
+      return nullptr;
+    } else {
+      return std::make_unique<Writing<decltype(kind)>>(publisher, writer);
+    }
   });
 }
 

@@ -19,6 +19,7 @@ using FindBridge = std::function<std::optional<BridgeMark>(const fastdds::ertps:
                                                                          Take take,
                                                                          FindBridge find_bridge);
 
+/// @param type  not one of those of detections
 /// @param writer  of the publisher; deleted with the result
 [[nodiscard]] std::unique_ptr<Publisher> writing(MessageType type,
                                                  fastdds::edds::Publisher& publisher,

@@ -74,6 +74,42 @@ bool well_formed_odometry(const std::uint8_t* data, std::size_t size) {
   return counted(in);
 }
 
+bool well_formed_detections(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  header(in);
+  in.sequence(kMost, [&] {
+    header(in);
+    in.sequence(kMost, [&] {
+      in.bounded_text(kMost);
+      doubles(in, 1 + kPose + kCovariance);
+    });
+    doubles(in, kPose + 3);
+    in.bounded_text(kMost);
+  });
+  return counted(in);
+}
+
+bool well_formed_tags(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  header(in);
+  in.sequence(kMost, [&] {
+    in.bounded_text(kMost);
+    in.skip(4, 4);
+    doubles(in, 5 * 3);  // the centre and four corners
+    header(in);
+    doubles(in, kPose + kCovariance);
+  });
+  return counted(in);
+}
+
+bool well_formed_markers(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  header(in);
+  in.numbers(kMost);  // ids of 8 bytes
+  in.sequence(kMost, [&] { doubles(in, kPose); });
+  return counted(in);
+}
+
 bool well_formed_clock(const std::uint8_t* data, std::size_t size) {
   CdrReader in(data, size);
   time(in);

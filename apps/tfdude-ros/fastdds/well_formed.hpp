@@ -12,6 +12,9 @@ namespace tfdude::ros {
 [[nodiscard]] bool well_formed_string(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_pose(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_odometry(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_detections(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_tags(const std::uint8_t* data, std::size_t size);
+[[nodiscard]] bool well_formed_markers(const std::uint8_t* data, std::size_t size);
 [[nodiscard]] bool well_formed_clock(const std::uint8_t* data, std::size_t size);
 
 /// How many samples were not, in this process.

@@ -1,7 +1,5 @@
 #include "poses.hpp"
 
-#include <algorithm>
-
 #include "tfdude/math/perturbation.hpp"
 
 #include "names.hpp"
@@ -48,25 +46,24 @@ bool is_repeat(const PoseWithCovariance& message, const PoseWithCovariance& befo
          message.pose.quat == before.pose.quat && message.covariance == before.covariance;
 }
 
-Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
-                                   const std::string& child) {
-  auto a = id_of(message.frame, in.prefix);
+Result<Measurement> pose_message(const PoseWithCovariance& message, const std::string& child,
+                                 const std::string& prefix, const Variances& variances) {
+  auto a = id_of(message.frame, prefix);
   if (!a) return tl::unexpected(std::move(a.error()));
-  auto b = id_of(child, in.prefix);
+  auto b = id_of(child, prefix);
   if (!b) return tl::unexpected(std::move(b.error()));
   const auto pose = pose_of(message.pose);
   if (!pose) return tl::unexpected(pose.error());
-  const auto& numbers = message.covariance;
-  const bool is_zero =
-      std::all_of(numbers.begin(), numbers.end(), [](double one) { return one == 0; });
-  if (is_zero || numbers[0] == -1) {
-    return fail(Errc::kInvalidInput, "covariance: the message has none");
-  }
-  const auto ros = Covariance::from_matrix(Eigen::Map<const RowMajor>(numbers.data()));
-  if (!ros) return tl::unexpected(ros.error());
-  Measurement out{*std::move(a), *std::move(b), from_ros_covariance(*pose, *ros), std::nullopt};
-  out.stamp = given_stamp(message.stamp);
-  return out;
+  auto X_AB = with_ros_covariance(*pose, variances, message.covariance);
+  if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
+  return Measurement{*std::move(a), *std::move(b), *std::move(X_AB), given_stamp(message.stamp)};
+}
+
+Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
+                                   const std::string& child) {
+  auto out = pose_message(message, child, in.prefix, in.variances);
+  if (!out || out->X_AB.covariance.complete()) return out;
+  return fail(Errc::kInvalidInput, "covariance: the message has none");
 }
 
 }  // namespace tfdude::ros

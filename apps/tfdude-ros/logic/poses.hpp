@@ -9,6 +9,7 @@
 #include "tfdude/types/query.hpp"
 
 #include "../messages.hpp"
+#include "variances.hpp"
 
 // Poses with covariance. ROS's covariance is about axes parallel to those of the header's frame,
 // ours is that of the right perturbation, in the child frame (docs/uncertainty.md).
@@ -31,6 +32,7 @@ struct PoseIn {
   std::string child{};
   std::string prefix{};
   ObserveOptions options{};
+  Variances variances{};
 };
 
 /// @param now  the stamp of a path that is static
@@ -54,8 +56,13 @@ struct Measurement {
 /// Whether a message with a stamp is that before it once more.
 [[nodiscard]] bool is_repeat(const PoseWithCovariance& message, const PoseWithCovariance& before);
 
-/// @return kInvalidInput naming the field: a name, the pose, a covariance that is not one. All
-///   zero, or -1 as the first number, means in ROS that it is not known.
+/// The path that a message is about, from its frame to the child, with its pose and covariance.
+/// @return kInvalidInput naming the field: a name, the pose, a covariance that is not one
+[[nodiscard]] Result<Measurement> pose_message(const PoseWithCovariance& message,
+                                               const std::string& child, const std::string& prefix,
+                                               const Variances& variances);
+
+/// @return as pose_message(); also if the message has no covariance.
 [[nodiscard]] Result<Measurement> measurement_of(const PoseIn& in,
                                                  const PoseWithCovariance& message,
                                                  const std::string& child);

@@ -59,7 +59,8 @@ class Planner {
     } while (!is_known_to_ros(*at));
     ExportGroup& group = group_of(partitions);
     group.watched.insert(group.watched.end(), path.begin(), path.end());
-    group.edges.push_back({at->id, child.id, *name_of(*at), *name_of(child), moves});
+    group.edges.push_back(
+        {at->id, child.id, *name_of(*at), *name_of(child), moves, std::move(path)});
   }
 
   // The group of these partitions; joins their groups if they have several.
@@ -114,6 +115,26 @@ TfMessage SentFrames::changed(const std::vector<ExportEdge>& edges, const Values
     Time& last = stamps_[edges[i].ros_child];
     if (std::exchange(last, *values[i]->stamp) == *values[i]->stamp) continue;
     message.push_back(message_of(edges[i], *values[i]));
+  }
+  return message;
+}
+
+TfMessage SentFrames::between(const std::vector<ExportEdge>& edges, const Values& values,
+                              const Stamps& stamps, const Lookup& lookup) const {
+  TfMessage message;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const auto last = stamps_.find(edges[i].ros_child);
+    if (!values[i] || !values[i]->stamp || last == stamps_.end()) continue;
+    std::set<Time> instants;
+    for (const std::string& id : edges[i].path) {
+      for (const Time stamp : stamps(id, last->second)) {
+        if (stamp < *values[i]->stamp) instants.insert(stamp);
+      }
+    }
+    for (const Time instant : instants) {
+      const auto X = lookup(edges[i], instant);
+      if (X) message.push_back(message_of(edges[i], *X));
+    }
   }
   return message;
 }

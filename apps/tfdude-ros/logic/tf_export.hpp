@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -34,10 +35,11 @@ struct ExportEdge {
   /// The edge leads over a joint. Before its first sample it is not sent: a listener of tf2 takes
   /// an edge that was once on /tf_static for static from then on.
   bool moves = false;
+  std::vector<std::string> path{};  ///< the children of the edges in tf-dude that it consists of
 
   friend bool operator==(const ExportEdge& a, const ExportEdge& b) {
     return a.parent == b.parent && a.child == b.child && a.ros_parent == b.ros_parent &&
-           a.ros_child == b.ros_child && a.moves == b.moves;
+           a.ros_child == b.ros_child && a.moves == b.moves && a.path == b.path;
   }
 };
 
@@ -68,11 +70,18 @@ struct ExportView {
 /// What was sent of all groups, and so what is new.
 class SentFrames {
  public:
-  /// One per edge; none: not known.
+  /// One per edge, the newest; none: not known.
   using Values = std::vector<std::optional<StampedTransform>>;
+  /// The stamps of samples of a frame's edge after an instant, in order.
+  using Stamps = std::function<std::vector<Time>(const std::string& id, Time after)>;
+  using Lookup = std::function<Result<StampedTransform>(const ExportEdge& edge, Time at)>;
 
   /// @return the values with a stamp, unless it is that of the last message
   [[nodiscard]] TfMessage changed(const std::vector<ExportEdge>& edges, const Values& values);
+
+  /// Samples since the last message that are not the newest of their edge. Call before changed().
+  [[nodiscard]] TfMessage between(const std::vector<ExportEdge>& edges, const Values& values,
+                                  const Stamps& stamps, const Lookup& lookup) const;
 
   /// Keeps the values without a stamp, instead of those that the group had before.
   /// @return whether any of them has changed; then all must be sent

@@ -99,7 +99,7 @@ void TfImport::take_one(const TransformStamped& transform, const std::string& wr
                         bool is_static, SteadyTime now, const WhoHolds& who_holds,
                         std::optional<Time> arrival, Changes& changes) {
   auto one = check(transform, is_static, changes);
-  if (!one || !date(*one, arrival, changes)) return;
+  if (!one || joins(*one, changes) || !date(*one, arrival, changes)) return;
   const bool may =
       may_take(*one, writer, who_holds, changes) && has_parent(*one, who_holds, changes);
   if (!may) {
@@ -116,7 +116,8 @@ void TfImport::take_one(const TransformStamped& transform, const std::string& wr
 std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transform, bool is_static,
                                                  Changes& changes) {
   const std::string_view name = without_slashes(transform.child);
-  if (!settings_.frames.takes(name)) return std::nullopt;
+  const bool of_topic = transform.covariance.has_value();
+  if (!of_topic && !settings_.frames.takes(name)) return std::nullopt;
   auto id = id_of(transform.child, settings_.prefix);
   auto parent = id_of(transform.parent, settings_.prefix);
   if (!id || !parent) {
@@ -132,8 +133,89 @@ std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transfo
     report_once("value " + *id, "not taken: frame " + quote(*id) + ": " + why, changes);
     return std::nullopt;
   }
-  return Checked{*std::move(id),  *std::move(parent), {*pose, settings_.covariance},
-                 transform.stamp, is_static,          given_stamp(transform.stamp).has_value()};
+  Transform X_PC{*pose, transform.covariance.value_or(settings_.covariance)};
+  // Odometry begins where it says: that is what its frame is.
+  if (!X_PC.covariance.complete() && drift_of(*id) != nullptr) {
+    X_PC.covariance = StatedCovariance::exact();
+  }
+  const bool is_stamped = given_stamp(transform.stamp).has_value();
+  return Checked{*std::move(id), *std::move(parent), X_PC,    transform.stamp,
+                 is_static,      is_stamped,         of_topic};
+}
+
+bool TfImport::joins(const Checked& one, Changes& changes) {
+  const auto entry = entries_.find(one.id);
+  if (one.of_topic || entry == entries_.end() || !entry->second.of_topic) return false;
+  ++counts_.joined;
+  if (one.is_stamped && entry->second.parent == one.parent) extend(one.id, one.stamp, changes);
+  return true;
+}
+
+void TfImport::extend(const std::string& id, Time stamp, Changes& changes) {
+  const auto found = entries_.find(id);
+  if (found == entries_.end() || !found->second.is_held() || stamp <= found->second.newest) return;
+  found->second.newest = stamp;
+  batch_of(stamp, id, changes.batches).edges.push_back({id, {found->second.X_PC, {}}});
+}
+
+TfImport::Changes TfImport::hold(const TransformStamped& transform, SteadyTime now,
+                                 const WhoHolds& who_holds) {
+  Changes changes;
+  const auto one = serve(transform, false, now, who_holds, changes);
+  if (one) extend(one->id, one->stamp, changes);
+  return changes;
+}
+
+TfImport::Changes TfImport::place(const TransformStamped& transform, SteadyTime now,
+                                  const WhoHolds& who_holds) {
+  Changes changes;
+  (void)serve(transform, true, now, who_holds, changes);
+  return changes;
+}
+
+std::optional<TfImport::Checked> TfImport::serve(const TransformStamped& transform, bool is_static,
+                                                 SteadyTime now, const WhoHolds& who_holds,
+                                                 Changes& changes) {
+  TransformStamped given = transform;
+  given.covariance = StatedCovariance::unspecified();
+  auto one = check(given, is_static, changes);
+  if (!one) return std::nullopt;
+  const auto known = entries_.find(one->id);
+  const bool is_observed = known != entries_.end() && known->second.observed;
+  if (is_observed && known->second.parent == one->parent) return std::nullopt;
+  if (!may_take(*one, {}, who_holds, changes) || !has_parent(*one, who_holds, changes)) {
+    ++counts_.owned;
+    return std::nullopt;
+  }
+  Entry& entry = entries_[one->id];
+  changes.edits.push_back({entry.exists ? Kind::kMove : Kind::kAdd, one->id, one->parent,
+                           Transform{one->X_PC.pose, {}}});
+  entry = Entry();
+  entry.exists = entry.of_topic = entry.observed = true;
+  entry.parent = one->parent;
+  entry.is_static = is_static;
+  entry.heard = now;
+  entry.X_PC = one->X_PC.pose;
+  return one;
+}
+
+const Covariance* TfImport::drift_of(std::string_view id) const {
+  const auto name = ros_name_of(id, settings_.prefix);
+  const auto found = name ? settings_.drifts.find(*name) : settings_.drifts.end();
+  return found == settings_.drifts.end() ? nullptr : &found->second;
+}
+
+std::optional<EdgeTiming> TfImport::timing_of(const std::string& id,
+                                              const EdgeTiming& usual) const {
+  const auto entry = entries_.find(id);
+  const bool held = entry != entries_.end() && entry->second.is_held();
+  const Covariance* density = drift_of(id);
+  if (!held && density == nullptr) return std::nullopt;
+  EdgeTiming timing = usual;
+  timing.drifts = true;
+  timing.moving = true;
+  timing.process_noise = held ? Covariance() : *density;
+  return timing;
 }
 
 bool TfImport::date(Checked& one, std::optional<Time> arrival, Changes& changes) {
@@ -191,7 +273,8 @@ bool TfImport::has_parent(const Checked& one, const WhoHolds& who_holds, Changes
 
 bool TfImport::may_write(const Checked& one, const std::string& writer, SteadyTime now,
                          Entry& entry, Changes& changes) {
-  if (entry.writer.empty() || entry.writer == writer) return true;
+  const bool takes_over = one.of_topic && !entry.of_topic;
+  if (entry.writer.empty() || entry.writer == writer || takes_over) return true;
   const bool is_active = now - entry.heard < kSilent;
   const bool agrees = entry.parent == one.parent;
   // A static transform is published once, by nodes that may all be there.
@@ -217,16 +300,24 @@ std::optional<Kind> TfImport::edit_for(const Checked& one, const Entry& entry, b
 void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime now, Entry& entry,
                      Changes& changes) {
   const bool decides = entry.writer == writer || now - entry.heard >= kSilent;
-  const bool jumped = !one.is_static && !entry.is_static && decides && entry.parent == one.parent &&
-                      entry.newest - one.stamp > kJump;
+  const bool same_edge = !one.is_static && !entry.is_static && entry.parent == one.parent;
+  // The partition cannot tell: of an edge that drifts it has the corrected pose.
+  const bool is_repeat = same_edge && one.is_stamped && one.stamp == entry.newest &&
+                         drift_of(one.id) != nullptr && equal(entry.X_PC, one.X_PC.pose);
+  if (is_repeat) return stamps_.same();
+  const bool jumped = same_edge && decides && entry.newest - one.stamp > kJump;
   if (jumped) report_jump(one, entry.newest, now, changes);
-  const auto edit = edit_for(one, entry, jumped);
+  // The samples of /tf at these instants have no covariance.
+  const bool takes_over = same_edge && one.of_topic && !entry.of_topic;
+  const auto edit = edit_for(one, entry, jumped || takes_over);
   if (edit) changes.edits.push_back({*edit, one.id, one.parent, one.X_PC});
+  if (jumped) end_hold(one.parent, changes);
   if (!one.is_static) {
     // While the clock stands still, the sample before is replaced.
     const bool replaces = !one.is_stamped && !edit && !entry.is_static && one.stamp <= entry.newest;
     const auto stamp = replaces ? std::nullopt : std::optional<Time>(one.stamp);
     batch_of(stamp, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+    if (one.is_stamped) extend(one.parent, one.stamp, changes);
   } else if (!edit && !equal(entry.X_PC, one.X_PC.pose)) {
     batch_of(std::nullopt, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
   }
@@ -237,6 +328,17 @@ void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime n
   entry.writer = writer;
   entry.heard = now;
   entry.X_PC = one.X_PC.pose;
+  entry.of_topic = one.of_topic;
+  entry.observed = false;
+}
+
+// What was found out about a held edge was so in the time before the jump.
+void TfImport::end_hold(const std::string& id, Changes& changes) {
+  const auto found = entries_.find(id);
+  if (found == entries_.end() || !found->second.is_held()) return;
+  found->second.newest = Time();
+  changes.edits.push_back(
+      {Kind::kMove, id, found->second.parent, Transform{found->second.X_PC, {}}});
 }
 
 // All frames of a bag jump at the same moment.

@@ -43,12 +43,16 @@ struct ImportCounts {
   std::uint64_t contested = 0;  ///< another publisher gives the frame another parent
   std::uint64_t rejected = 0;   ///< by the partition: a cycle, too old...
   std::uint64_t timeless = 0;   ///< without a stamp, while the clock has no time yet
+  std::uint64_t joined = 0;     ///< of an edge whose values come from another topic
 };
 
 struct ImportSettings {
   Choice frames;  ///< by the names in ROS
   std::string prefix;
   StatedCovariance covariance = StatedCovariance::unspecified();
+  /// Edges that drift (EdgeTiming::drifts), and the density of their random walk: by the child's
+  /// name in ROS.
+  std::map<std::string, Covariance> drifts{};
 };
 
 class TfImport {
@@ -93,6 +97,30 @@ class TfImport {
                              SteadyTime now, const WhoHolds& who_holds,
                              std::optional<Time> arrival = std::nullopt);
 
+  /// Serves an edge whose value observations will determine, between two frames of ROS. From now on
+  /// it has the same samples as the edges below it; each stands for no motion since the one before.
+  /// Its values on /tf only tell their stamps. Without an effect if it is served so already.
+  /// @param transform  the first sample, with a stamp; its covariance is unspecified
+  [[nodiscard]] Changes hold(const TransformStamped& transform, SteadyTime now,
+                             const WhoHolds& who_holds);
+
+  /// Serves a static edge whose value observations will determine. What /tf says of it does not
+  /// count. Without an effect if it is served so already.
+  [[nodiscard]] Changes place(const TransformStamped& transform, SteadyTime now,
+                              const WhoHolds& who_holds);
+
+  /// Whether it has taken the values of a frame from another topic than /tf.
+  [[nodiscard]] bool has_of_topic(const std::string& id) const {
+    const auto entry = entries_.find(id);
+    return entry != entries_.end() && entry->second.exists && entry->second.of_topic;
+  }
+  /// The partition has removed a frame.
+  void forget(const std::string& id) { entries_.erase(id); }
+
+  /// How a frame behaves in time, if not as all others do. Set it after each kAdd and kMove.
+  [[nodiscard]] std::optional<EdgeTiming> timing_of(const std::string& id,
+                                                    const EdgeTiming& usual) const;
+
   /// Static transforms come only once. Takes those again that were not taken because of their
   /// owner. Call when the structure has changed.
   [[nodiscard]] Changes retry(SteadyTime now, const WhoHolds& who_holds);
@@ -120,11 +148,16 @@ class TfImport {
     bool exists = false;  // in the partition
     std::string parent;   // empty: only known as the parent of others
     bool is_static = false;
-    std::string writer;   // of the newest transform
-    SteadyTime heard{};   // when that came
-    Time newest{};        // its stamp
-    Pose X_PC{};          // if static
-    bool shared = false;  // it was reported that it has several publishers
+    std::string writer;     // of the newest transform
+    SteadyTime heard{};     // when that came
+    Time newest{};          // its stamp
+    Pose X_PC{};            // if static
+    bool shared = false;    // it was reported that it has several publishers
+    bool of_topic = false;  // its values are not those of /tf
+    bool observed = false;  // observations determine them
+
+    // See hold(). X_PC is the value of each sample.
+    [[nodiscard]] bool is_held() const { return observed && !is_static; }
   };
   struct HeldBack {
     TransformStamped transform;
@@ -138,6 +171,7 @@ class TfImport {
     Time stamp;  // without one, that of the arrival
     bool is_static;
     bool is_stamped;
+    bool of_topic;
   };
 
   void take_one(const TransformStamped& transform, const std::string& writer, bool is_static,
@@ -148,6 +182,16 @@ class TfImport {
   /// Dates a sample without a stamp. @return whether that is possible
   [[nodiscard]] bool date(Checked& one, std::optional<Time> arrival, Changes& changes);
   [[nodiscard]] Holding holding(const std::string& id, const WhoHolds& who_holds) const;
+  /// Whether the values of the frame come from another topic than /tf: then this one only says that
+  /// there is data.
+  [[nodiscard]] bool joins(const Checked& one, Changes& changes);
+  /// Serves an edge that observations determine. @return the edge; null if it changes nothing
+  [[nodiscard]] std::optional<Checked> serve(const TransformStamped& transform, bool is_static,
+                                             SteadyTime now, const WhoHolds& who_holds,
+                                             Changes& changes);
+  /// Gives a held edge a sample.
+  void extend(const std::string& id, Time stamp, Changes& changes);
+  void end_hold(const std::string& id, Changes& changes);
   [[nodiscard]] bool may_take(const Checked& one, const std::string& writer,
                               const WhoHolds& who_holds, Changes& changes);
   [[nodiscard]] bool has_parent(const Checked& one, const WhoHolds& who_holds, Changes& changes);
@@ -158,6 +202,7 @@ class TfImport {
              Changes& changes);
   [[nodiscard]] static std::optional<Edit::Kind> edit_for(const Checked& one, const Entry& entry,
                                                           bool jumped);
+  [[nodiscard]] const Covariance* drift_of(std::string_view id) const;
   void report_jump(const Checked& one, Time newest, SteadyTime now, Changes& changes);
   void report_once(const std::string& about, std::string text, Changes& changes);
   [[nodiscard]] bool is_first(const std::string& about);

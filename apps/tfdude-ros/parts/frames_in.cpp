@@ -29,9 +29,9 @@ void FramesIn::stop() {
   const ImportCounts& counts = import_.counts();
   spdlog::info(
       "transforms of ROS: taken={} not taken: names={} values={} owned={} contested={} rejected={} "
-      "timeless={}; of their stamps: {}; dropped messages={}",
+      "timeless={} joined={}; of their stamps: {}; dropped messages={}",
       counts.taken, counts.names, counts.values, counts.owned, counts.contested, counts.rejected,
-      counts.timeless, import_.stamps().summary(), worker_.dropped());
+      counts.timeless, counts.joined, import_.stamps().summary(), worker_.dropped());
 }
 
 void FramesIn::on_change(const Change& change) {
@@ -44,6 +44,30 @@ void FramesIn::on_change(const Change& change) {
     apply(import_.retry(cli::Worker::Clock::now(),
                         [this](const std::string& id) { return structure_.holding(id); }));
   });
+}
+
+void FramesIn::hold(const TransformStamped& transform) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  apply(import_.hold(transform, cli::Worker::Clock::now(),
+                     [this](const std::string& id) { return structure_.holding(id); }));
+}
+
+void FramesIn::place(const TransformStamped& transform) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  apply(import_.place(transform, cli::Worker::Clock::now(),
+                      [this](const std::string& id) { return structure_.holding(id); }));
+}
+
+bool FramesIn::drop(const std::string& id) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!import_.has_of_topic(id)) return true;
+  const auto below = node_.children(id);
+  if (below && !below->empty()) return false;
+  const auto removed = node_.remove(id);
+  if (!removed && removed.error().code != Errc::kUnknownFrame) return false;
+  import_.forget(id);
+  structure_.changed();
+  return true;
 }
 
 void FramesIn::add_root(const std::string& id) {
@@ -88,7 +112,14 @@ void FramesIn::apply(const Edit& edit) {
       default:  // also to the same parent: without samples it is static
         return node_.move(edit.id, edit.parent, *edit.X_PC);
     }
-  }();
+  }()
+                                 .and_then([&]() -> Result<void> {
+                                   const auto timing = import_.timing_of(edit.id, timing_);
+                                   const bool is_new = edit.kind == Edit::Kind::kAdd ||
+                                                       edit.kind == Edit::Kind::kMove;
+                                   return is_new && timing ? node_.set_timing(edit.id, *timing)
+                                                           : Result<void>();
+                                 });
   if (!done) rejected(edit.id, done.error());
 }
 

@@ -19,14 +19,26 @@ namespace tfdude::ros {
 class FramesIn {
  public:
   /// @param node  serves the partition; outlives it
-  FramesIn(Node& node, const ImportSettings& settings)
-      : node_(node), structure_(node), import_(settings) {}
+  /// @param timing  of its edges
+  FramesIn(Node& node, const ImportSettings& settings, const EdgeTiming& timing)
+      : node_(node), structure_(node), timing_(timing), import_(settings) {}
 
   /// @param is_own  whether a bridge is in the same domain of tf-dude: its frames are there already
   /// @return kTransport.
   [[nodiscard]] Result<void> start(RosDomain& domain, const IsNeighbour& is_own);
   /// Nothing is taken any more. Logs what was not.
   void stop();
+
+  /// Takes values of another topic than /tf. Thread-safe.
+  void take(const TfMessage& values, const std::string& writer) { take(values, writer, false); }
+  /// Serves an edge that observations determine (TfImport::hold()). Thread-safe.
+  void hold(const TransformStamped& transform);
+
+  /// Serves an edge that observations determine, for all times (TfImport::place()). Thread-safe.
+  void place(const TransformStamped& transform);
+  /// Removes a frame whose values came from another topic than /tf, unless there are others below
+  /// it. Thread-safe. @return whether it is no longer there
+  bool drop(const std::string& id);
 
   /// Serves a frame as a root, until /tf names its parent. Thread-safe.
   void add_root(const std::string& id);
@@ -50,6 +62,7 @@ class FramesIn {
 
   Node& node_;
   Structure structure_;
+  const EdgeTiming timing_;
   std::mutex mutex_;  // so that what is decided is also applied before the next decision
   TfImport import_;
   std::atomic<bool> retrying_{false};

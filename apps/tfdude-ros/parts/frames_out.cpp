@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -172,8 +173,16 @@ void FramesOut::send(std::size_t group, const std::vector<ExportEdge>& edges,
     auto X = watch.lookup(edge.parent, edge.child);
     values.push_back(X ? std::optional<StampedTransform>(*std::move(X)) : std::nullopt);
   }
+  const auto at = [&](const ExportEdge& edge, Time instant) {
+    Query query;
+    query.at = instant;
+    return watch.lookup(edge.parent, edge.child, query);
+  };
+  const auto stamps = [&](const std::string& id, Time after) { return watch.stamps(id, after); };
   const std::lock_guard<std::mutex> lock(mutex_);
-  auto changed = sent_.changed(edges, values);
+  auto changed = sent_.between(edges, values, stamps, at);
+  auto newest = sent_.changed(edges, values);
+  std::move(newest.begin(), newest.end(), std::back_inserter(changed));
   if (tf_ != nullptr && !changed.empty()) tf_->publish(std::move(changed));
   if (sent_.set_static(group, edges, values)) send_static();
 }

@@ -27,6 +27,11 @@ struct Lookup final : Question {
     add_milliseconds(app, "--wait", wait_ms, "how long to wait for frames and data");
     app.get_option("--wait")->excludes(option);
     add_recording(app);
+    add_stamp(app, "--believed-at", believed_at,
+              "with --recording: what was known at this instant of that of --at, before later data "
+              "corrected it")
+        ->needs(app.get_option("--recording"))
+        ->excludes(option);
     for (const char* other :
          {"--at", "--extrapolate", "--age-noise", "--order", "--wait", "--fixed", "--recording"}) {
       redraw->excludes(app.get_option(other));

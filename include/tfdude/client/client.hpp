@@ -397,6 +397,16 @@ class TFDUDE_EXPORT Client {
                                          std::optional<Time> stamp = std::nullopt,
                                          const ObserveOptions& options = {});
 
+  /// Gives one edge the value by which a path over it is X_AB, as observe() does with an edge of
+  /// unspecified covariance: the value replaces the one before, and no other edge is corrected. For
+  /// poses that a filter has estimated from the same sensors as those before: X_AB is that of the
+  /// robot in the map, the edge that of the odometry's frame in the map.
+  /// @param id  the frame whose edge to its parent takes the value
+  /// @return as observe(); kInvalidInput: the path has no such edge
+  [[nodiscard]] Result<Observed> determine(const std::string& id, const std::string& a,
+                                           const std::string& b, const Transform& X_AB,
+                                           std::optional<Time> stamp = std::nullopt);
+
   /// As observe(), for the edge from a frame's parent to the frame: merges a measurement with the
   /// edge's value.
   /// @return as observe(); kUnknownFrame, kInvalidInput (a root).

@@ -56,6 +56,11 @@ class TFDUDE_EXPORT Node : public Client {
   /// Likewise for all dynamic edges of the partition, as one commit. @return how many
   std::size_t clear_history();
 
+  /// Sets how an edge behaves in time, and clears its history. For frames that were added; those of
+  /// open() have it in their FrameSpec. It is not stored.
+  /// @return kUnknownFrame, kNotOwner, kInvalidInput (naming what is wrong with the timing).
+  [[nodiscard]] Result<void> set_timing(const std::string& id, const EdgeTiming& timing);
+
   /// For players of recordings: joints() of this partition are these from now on. They move no
   /// frame. An empty list: those of its frames.
   void show_joints(std::vector<JointInfo> joints);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
@@ -90,6 +91,12 @@ class TFDUDE_EXPORT EdgesWatch {
   ///   kUnknownFrame if one of the edges no longer exists.
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query = {}) const;
+
+  /// The stamps of the samples of a watched edge after an instant, in order, as far as they are
+  /// kept (WatchOptions::timing): for those who must not miss one. Takes a lock. O(samples).
+  /// @param id  of the child
+  /// @return empty also if the edge has none, or is not known yet
+  [[nodiscard]] std::vector<Time> stamps(std::string_view id, Time after) const;
 
   /// As PathWatch::health().
   [[nodiscard]] Result<void> health() const;

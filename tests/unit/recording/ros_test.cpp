@@ -22,8 +22,9 @@ struct Sent {
   std::array<double, 4> quat{0, 0, 0, 1};
 };
 
-// A file of rosbag2 with one message on /tf_static for each transform.
-std::string file_of(const std::vector<Sent>& all) {
+// A file of rosbag2 with one message for each transform, logged from 10 s on, once a second.
+std::string file_of(const std::vector<Sent>& all, const std::string& topic = "/tf_static",
+                    std::uint32_t stamp = 10) {
   std::string file;
   McapWriter writer(
       [&](std::string_view bytes) {
@@ -33,13 +34,13 @@ std::string file_of(const std::vector<Sent>& all) {
       {"ros2", "libmcap 1.4.0", true, 1, 300});
   REQUIRE(writer.start());
   REQUIRE(writer.add_schema({1, "tf2_msgs/msg/TFMessage", "ros2msg", "..."}));
-  REQUIRE(writer.add_channel({1, 1, "/tf_static", "cdr", {}}));
+  REQUIRE(writer.add_channel({1, 1, topic, "cdr", {}}));
   std::uint64_t log = 10'000'000'000;
   for (const Sent& sent : all) {
     std::string message;
     CdrWriter cdr(message);
     cdr.u32(1);
-    cdr.u32(10);
+    cdr.u32(stamp);
     cdr.u32(0);
     cdr.text(sent.parent);
     cdr.text(sent.child);
@@ -92,4 +93,18 @@ TEST_CASE("recording of ROS: quaternions are normalized as in tf2, and others co
   CHECK(recording->lookup("base", "good"));
   recording->read_all();
   CHECK(recording->summary().left_out == 4);
+}
+
+TEST_CASE("recording of ROS: a stamp of 0 was not set, and means the time of the message") {
+  auto recording = Recording::read(
+      file_of({{"odom", "base", 1}, {"odom", "base", 2}, {"odom", "base", 3}}, "/tf", 0));
+  REQUIRE(recording);
+  recording->read_all();
+  Query query;
+  query.at = time_of(11'500'000'000);
+  const auto X = recording->lookup("odom", "base", query);
+  REQUIRE(X);
+  CHECK(X->pose.translation().x() == 2.5);
+  REQUIRE(recording->summary().problems.size() == 1);
+  CHECK_THAT(recording->summary().problems[0], ContainsSubstring("no stamp"));
 }

@@ -1,5 +1,6 @@
-#include "clock_in.hpp"
+#include "clock.hpp"
 
+#include <chrono>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -17,6 +18,25 @@ void ClockIn::take(Time now) {
   const auto sent = node_.publish_clock(now);
   if (sent || std::exchange(logged_, sent.error().message) == sent.error().message) return;
   spdlog::warn("/clock: {}", sent.error().message);
+}
+
+Result<void> ClockOut::start(RosDomain& domain) {
+  auto publisher = domain.advertise(clock_topic());
+  if (!publisher) return tl::unexpected(std::move(publisher.error()));
+  publisher_ = *std::move(publisher);
+  const std::chrono::duration<double> period(1 / rate_);
+  worker_.repeat(std::chrono::duration_cast<std::chrono::nanoseconds>(period), [this] { send(); });
+  return {};
+}
+
+void ClockOut::stop() {
+  worker_.stop();
+  publisher_ = nullptr;
+}
+
+void ClockOut::send() {
+  const auto now = node_.now();
+  if (now) publisher_->publish(ClockTime{*now});
 }
 
 }  // namespace tfdude::ros

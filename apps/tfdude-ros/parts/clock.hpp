@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "tfdude/client/node.hpp"
@@ -27,6 +28,26 @@ class ClockIn {
 
   Node& node_;
   std::string logged_;
+  cli::Worker worker_{10};  // last: it uses the other members
+};
+
+/// Sends the time of tf-dude's external clock to /clock, again and again, so that nodes that start
+/// later have it.
+class ClockOut {
+ public:
+  /// @param node  outlives it
+  ClockOut(Node& node, double rate) : node_(node), rate_(rate) {}
+
+  /// @param domain  outlives it until stop(). @return kTransport.
+  [[nodiscard]] Result<void> start(RosDomain& domain);
+  void stop();
+
+ private:
+  void send();
+
+  Node& node_;
+  const double rate_;  // [Hz]
+  std::unique_ptr<Publisher> publisher_;
   cli::Worker worker_{10};  // last: it uses the other members
 };
 

@@ -1,0 +1,79 @@
+#include "values.hpp"
+
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude::ros {
+namespace {
+
+// How long a pose waits for the odometry of its instant.
+constexpr Milliseconds kPatience{1000};
+
+}  // namespace
+
+Result<void> ValueTaker::start(RosDomain& domain, const IsNeighbour& is_own) {
+  const Topic topic =
+      settings_.odometry ? odometry_topic(settings_.topic) : pose_topic(settings_.topic);
+  return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {
+    if (source.bridge && is_own(*source.bridge)) return;
+    worker_.post([this, taken = std::move(message), writer = source.guid] {
+      if (const auto* odometry = std::get_if<Odometry>(&taken)) {
+        const bool named = settings_.child.empty();
+        take(odometry->pose, named ? odometry->child : settings_.child, writer);
+      } else {
+        take(std::get<PoseWithCovariance>(taken), settings_.child, writer);
+      }
+    });
+  });
+}
+
+void ValueTaker::stop() {
+  worker_.stop();
+  spdlog::info("{}: values taken={} failed={}; dropped messages={}", settings_.topic, taken_,
+               failed_, worker_.dropped());
+}
+
+void ValueTaker::take(const PoseWithCovariance& message, const std::string& child,
+                      const std::string& writer) {
+  const auto done = [&]() -> Result<void> {
+    if (!settings_.edge.empty()) return determine(message, child);
+    return transform_of(settings_, message, child).map([&](const TransformStamped& value) {
+      frames_.take({value}, writer);
+    });
+  }();
+  if (done) {
+    ++taken_;
+    logged_.clear();
+    return;
+  }
+  ++failed_;
+  const std::string& why = done.error().message;
+  if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+}
+
+Result<void> ValueTaker::determine(const PoseWithCovariance& message, const std::string& child) {
+  auto value = value_of(settings_, message, child);
+  if (!value) return tl::unexpected(std::move(value.error()));
+  const auto edge = id_of(settings_.edge, settings_.prefix);
+  if (!edge) return tl::unexpected(edge.error());
+  if (!value->X_AB.covariance.complete()) {
+    return fail(Errc::kInvalidInput, "covariance: the message has none");
+  }
+  Query query;
+  query.at = value->stamp;
+  const auto X_EB = node_.lookup(*edge, value->b, query, kPatience);
+  if (!X_EB) return tl::unexpected(X_EB.error());
+  const auto stamp = value->stamp ? value->stamp : X_EB->stamp;
+  if (!stamp) {
+    return fail(Errc::kInvalidInput, "neither the message has a stamp nor the frame " +
+                                         quote(*edge) + " to " + quote(value->b));
+  }
+  const Pose X_AE = value->X_AB.pose * X_EB->pose.inverse();
+  frames_.hold({*stamp, message.frame, settings_.edge, ros_pose_of(X_AE)});
+  return node_.determine(*edge, value->a, value->b, value->X_AB, *stamp).map([](const auto&) {});
+}
+
+}  // namespace tfdude::ros
