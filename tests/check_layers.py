@@ -42,6 +42,7 @@ CONFINED = [
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("OpenSSL", r"openssl/", ["src/keys/"]),
     ("zstd", r"zstd\.h$", ["src/recording/"]),
+    ("GeographicLib", r"GeographicLib/", ["src/math/earth.cpp"]),
     ("zlib", r"zlib\.h$", ["src/recording/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
@@ -149,9 +150,9 @@ class Checker:
             if re.match(pattern, name) and layer in layers:
                 self.report(path, position, "barred", f"<{name}>: {layer} does without {what}")
         standard = "/" not in name and "." not in name
-        if layer == "math" and not standard and not name.startswith(("Eigen/", "boost/math/")):
+        if layer == "math" and not standard and not name.startswith(("Eigen/", "boost/math/", "GeographicLib/")):
             self.report(path, position, "math",
-                        f"<{name}>: math knows only Eigen, Boost.Math, base and std")
+                        f"<{name}>: math knows only Eigen, Boost.Math, GeographicLib, base and std")
 
     def check_own(self, path, layer, position, name, target):
         other = layer_of(target)
