@@ -17,6 +17,8 @@ LAYERS = ["base", "math", "types", "tree", "partition", "calls", "description", 
           "transport", "memory", "runtime", "client", "apps", "python"]
 # Use the library as everybody does, and know nothing of each other.
 USERS = ["apps", "python"]
+# A header whose name its users expect there.
+ABOVE_LAYERS = {"include/tfdude/tf2.hpp": "client"}
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 # Has another participant, in a domain of ROS. It shares the differences between versions, and the reader of CDR.
@@ -89,6 +91,8 @@ def strip_comments(text, literals_too=False):
 
 def layer_of(path):
     """The layer of a file of the project; None if it belongs to no layer."""
+    if path in ABOVE_LAYERS:
+        return ABOVE_LAYERS[path]
     match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps|python)/", path)
     name = match and (match[1] or match[2])
     return name if name in LAYERS else None
