@@ -39,6 +39,8 @@ std::vector<Kept> kept_of(std::string_view type) {
   return kept;
 }
 
+constexpr const char* kRunXacro = ": run xacro first, and load its output";
+
 // Finds the first element of xacro: a file with macros is not yet a URDF.
 class XacroSearch final : public tinyxml2::XMLVisitor {
  public:
@@ -52,6 +54,10 @@ class XacroSearch final : public tinyxml2::XMLVisitor {
  private:
   const XMLElement* found_ = nullptr;
 };
+
+bool is_expression(const std::string& text) {
+  return text.find("${") != std::string::npos || text.find("$(") != std::string::npos;
+}
 
 // An attribute as XML defines it: a tab or line end in it is a space. Empty if there is none.
 std::string attribute(const XMLElement& element, const char* name) {
@@ -118,6 +124,14 @@ class TextReader {
     return file_error(Errc::kInvalidInput, file_, element.GetLineNum(), message);
   }
 
+  // An expression of xacro would be a name like any other.
+  [[nodiscard]] Result<void> check_expanded(const XMLElement& element, const char* name) const {
+    const std::string value = attribute(element, name);
+    if (!is_expression(value)) return {};
+    return file_error(Errc::kConfig, file_, element.GetLineNum(),
+                      quote(value) + " is an expression of xacro" + kRunXacro);
+  }
+
   void push(const XMLElement& element, const char* name) {
     if (element.Attribute(name) == nullptr) return;
     printer_.PushAttribute(name, attribute(element, name).c_str());
@@ -126,6 +140,7 @@ class TextReader {
   [[nodiscard]] Result<void> link(const XMLElement& element) {
     text_.links.push_back({attribute(element, "name"), element.GetLineNum()});
     if (text_.links.back().name.empty()) return error(element, "a link has no name");
+    if (auto ok = check_expanded(element, "name"); !ok) return ok;
     printer_.OpenElement("link");
     push(element, "name");
     printer_.CloseElement();
@@ -137,6 +152,9 @@ class TextReader {
     joint.name = attribute(element, "name");
     joint.line = element.GetLineNum();
     if (joint.name.empty()) return error(element, "a joint has no name");
+    for (const char* name : {"name", "type"}) {
+      if (auto ok = check_expanded(element, name); !ok) return ok;
+    }
     const std::string what = described("joint", joint.name);
     printer_.OpenElement("joint");
     push(element, "name");
@@ -165,6 +183,7 @@ class TextReader {
   [[nodiscard]] Result<void> read_quaternion(const XMLElement& origin, const std::string& what,
                                              UrdfText::Joint& joint) const {
     if (origin.Attribute("quat_xyzw") == nullptr) return {};
+    if (auto ok = check_expanded(origin, "quat_xyzw"); !ok) return ok;
     if (origin.Attribute("rpy") != nullptr) {
       return error(origin, what + ": rpy and quat_xyzw are both given, one is enough");
     }
@@ -204,6 +223,7 @@ class TextReader {
     printer_.OpenElement(kept.element);
     const bool limits = kept.element == std::string_view("limit");
     for (const char* name : kept.attributes) {
+      if (auto ok = check_expanded(part, name); !ok) return ok;
       // urdfdom logs a bad number as a format of printf, so it must contain no percent sign.
       const std::string value = attribute(part, name);
       const bool names = std::strcmp(name, "link") == 0 || std::strcmp(name, "joint") == 0;
@@ -240,7 +260,7 @@ Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file
   robot->Accept(&search);
   if (search.found() != nullptr) {
     return file_error(Errc::kConfig, file, search.found()->GetLineNum(),
-                      "<" + printable(search.found()->Name()) + "> is a xacro element: run xacro first, and load its output");
+                      "<" + printable(search.found()->Name()) + "> is a xacro element" + kRunXacro);
   }
   UrdfText found;
   if (auto ok = TextReader(found, file).robot(*robot); !ok) return tl::unexpected(ok.error());
