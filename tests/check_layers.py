@@ -17,6 +17,8 @@ LAYERS = ["base", "math", "types", "tree", "partition", "calls", "description", 
           "transport", "memory", "runtime", "client", "apps", "python"]
 # Use the library as everybody does, and know nothing of each other.
 USERS = ["apps", "python"]
+# A header whose name its users expect there.
+ABOVE_LAYERS = {"include/tfdude/tf2.hpp": "client"}
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
 # Has another participant, in a domain of ROS. It shares the differences between versions, and the reader of CDR.
@@ -42,6 +44,7 @@ CONFINED = [
     ("SQLite", r"sqlite3\.h$", ["src/store/"]),
     ("OpenSSL", r"openssl/", ["src/keys/"]),
     ("zstd", r"zstd\.h$", ["src/recording/"]),
+    ("GeographicLib", r"GeographicLib/", ["src/math/earth.cpp"]),
     ("zlib", r"zlib\.h$", ["src/recording/"]),
     ("CLI11", r"CLI/", ["apps/"]),
     ("nlohmann", r"nlohmann/", ["apps/"]),
@@ -88,6 +91,8 @@ def strip_comments(text, literals_too=False):
 
 def layer_of(path):
     """The layer of a file of the project; None if it belongs to no layer."""
+    if path in ABOVE_LAYERS:
+        return ABOVE_LAYERS[path]
     match = re.match(r"(?:include/tfdude|src)/([^/]+)/|(apps|python)/", path)
     name = match and (match[1] or match[2])
     return name if name in LAYERS else None
@@ -149,9 +154,9 @@ class Checker:
             if re.match(pattern, name) and layer in layers:
                 self.report(path, position, "barred", f"<{name}>: {layer} does without {what}")
         standard = "/" not in name and "." not in name
-        if layer == "math" and not standard and not name.startswith(("Eigen/", "boost/math/")):
+        if layer == "math" and not standard and not name.startswith(("Eigen/", "boost/math/", "GeographicLib/")):
             self.report(path, position, "math",
-                        f"<{name}>: math knows only Eigen, Boost.Math, base and std")
+                        f"<{name}>: math knows only Eigen, Boost.Math, GeographicLib, base and std")
 
     def check_own(self, path, layer, position, name, target):
         other = layer_of(target)

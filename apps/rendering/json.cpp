@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "tfdude/math/perturbation.hpp"
+
 #include "quantities.hpp"
 #include "table.hpp"
 
@@ -70,6 +72,24 @@ json lookup_json(const std::string& a, const std::string& b, const StampedTransf
   json object = lookup_json(a, b, X_AB, names_of(path, &PathSegment::partition));
   add_stamp(object, X_AB.stamp);
   object["basis"] = basis_json(X_AB.basis);
+  return object;
+}
+
+json geodetic_json(const GeodeticPose& seen) {
+  json object{{"latitude", seen.place.latitude},
+              {"longitude", seen.place.longitude},
+              {"altitude", seen.place.altitude},
+              {"rotation_enu", numbers_json(seen.X_NB.pose.rotation().coeffs())},
+              {"utm",
+               {{"zone", zone_text(seen.utm)},
+                {"easting", seen.utm.easting},
+                {"northing", seen.utm.northing},
+                {"convergence", seen.utm.convergence},
+                {"scale", seen.utm.scale}}},
+              {"stddev_enu", nullptr}};
+  if (!seen.X_NB.covariance.complete()) return object;
+  const auto deviations = stddev_in_parent(seen.X_NB);
+  object["stddev_enu"] = {deviations[0], deviations[1], deviations[2]};
   return object;
 }
 

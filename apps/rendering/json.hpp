@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/math/earth.hpp"
 
 // Answers for programs, as objects of JSON.
 namespace tfdude::cli {
@@ -40,6 +41,8 @@ void add_stamp(nlohmann::json& object, const std::optional<Time>& stamp);
 [[nodiscard]] nlohmann::json lookup_json(const std::string& a, const std::string& b,
                                          const StampedTransform& X_AB,
                                          const std::vector<PathSegment>& path);
+/// Latitude and longitude in degrees.
+[[nodiscard]] nlohmann::json geodetic_json(const GeodeticPose& seen);
 [[nodiscard]] nlohmann::json basis_json(const Basis& basis);
 [[nodiscard]] nlohmann::json frame_json(const Frame& frame);
 [[nodiscard]] nlohmann::json partition_json(const PartitionInfo& partition);

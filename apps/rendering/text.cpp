@@ -119,6 +119,21 @@ std::string describe(const Transform& X_AB, const Shown& shown,
   return text + matrix_table(X_AB.covariance.of_specified().matrix(), shown.angles);
 }
 
+std::string describe(const GeodeticPose& seen, const AngleUnit& angles) {
+  const Eigen::Vector3d rpy = to_rpy(seen.X_NB.pose.rotation());
+  std::string text = format("latitude     %.9f deg\nlongitude    %.9f deg\naltitude     %.4f m\n",
+                            seen.place.latitude, seen.place.longitude, seen.place.altitude);
+  text += "rpy to ENU   " + angles_text(rpy.x(), rpy.y(), rpy.z(), angles) + "\n";
+  if (seen.X_NB.covariance.complete()) {
+    const auto s = stddev_in_parent(seen.X_NB);
+    text += format("std dev ENU  %.6f  %.6f  %.6f  m\n", s[0], s[1], s[2]);
+  }
+  return text + format("%s %s  %.4f  %.4f  m, scale %.8f, convergence %.6f deg\n",
+                       seen.utm.zone == 0 ? "ups         " : "utm         ",
+                       zone_text(seen.utm).c_str(), seen.utm.easting, seen.utm.northing,
+                       seen.utm.scale, seen.utm.convergence * kDegrees);
+}
+
 std::string describe(const Basis& basis) {
   // Sources with a name that somebody gave, and those that observations have left.
   std::vector<std::string> named;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tfdude/client/client.hpp"
+#include "tfdude/math/earth.hpp"
 
 #include "angles.hpp"
 
@@ -28,6 +29,8 @@ inline constexpr const char* kAxesOfRotation = "about the axes of B";
 /// @param unspecified  the edges whose covariance is unspecified
 [[nodiscard]] std::string describe(const Transform& X_AB, const Shown& shown,
                                    const std::vector<std::string>& unspecified = {});
+/// Where a frame is on the Earth: latitude, longitude, altitude, place on a map.
+[[nodiscard]] std::string describe(const GeodeticPose& seen, const AngleUnit& angles);
 /// What a covariance is based on, in words; empty for second order without correlation.
 [[nodiscard]] std::string describe(const Basis& basis);
 /// "unspecified for odom, base"

@@ -63,6 +63,17 @@ void add_pose(CLI::App& app, TransformSpec& spec) {
       ->excludes("--xyz")
       ->excludes(rpy)
       ->excludes(quat);
+  app.add_option(
+         "--geodetic", spec.geodetic,
+         "place in an earth frame, latitude and longitude [deg], altitude [m]; the rotation "
+         "is that to east, north and up")
+      ->type_name("LAT LON ALT")
+      ->excludes("--xyz")
+      ->excludes("--matrix");
+  add_covariance(app, spec);
+}
+
+void add_covariance(CLI::App& app, TransformSpec& spec) {
   auto* stddev = app.add_option("--stddev", spec.stddev, "standard deviations [m m m rad rad rad]")
                      ->type_name("6 NUMBERS");
   explain_angles(app);
@@ -86,7 +97,7 @@ Result<PartialTransform> typed_parts(const TransformSpec& spec, const Common& co
   const auto X_PC = typed_pose(spec, common, id);
   if (!X_PC) return tl::unexpected(X_PC.error());
   PartialTransform given;
-  if (spec.xyz || spec.matrix) given.translation = X_PC->pose.translation();
+  if (spec.gives_translation()) given.translation = X_PC->pose.translation();
   if (spec.gives_rotation()) given.rotation = X_PC->pose.rotation();
   if (spec.gives_covariance()) given.covariance = X_PC->covariance;
   return given;

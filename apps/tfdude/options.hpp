@@ -46,6 +46,8 @@ std::function<std::string(const std::string&)> within(double least, double most,
 
 /// Adds the options for a pose and its covariance.
 void add_pose(CLI::App& app, TransformSpec& spec);
+/// Those for the covariance alone.
+void add_covariance(CLI::App& app, TransformSpec& spec);
 /// The pose as typed. @return kInvalidInput naming the frame, and what is wrong with its pose
 [[nodiscard]] Result<Transform> typed_pose(const TransformSpec& spec, const Common& common,
                                            const std::string& id);

@@ -30,6 +30,8 @@ void add_watch_options(CLI::App& app, WatchOptions& options) {
 void Path::add_printing(CLI::App& app) {
   add_covariance_flag(app, covariance);
   app.add_flag("--matrix", matrix, "print the pose as homogeneous 4x4 matrix");
+  app.add_flag("--geodetic", geodetic,
+               "A is an earth frame: print B's latitude, longitude, altitude and place on a map");
   explain_angles(app);
 }
 
@@ -57,12 +59,21 @@ nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
   auto object = lookup_json(a, b, X_AB, path);
   object["unsampled_joints"] = assumed_joints(source, a, b, X_AB.basis.unspecified);
   if (matrix) object["matrix"] = matrix_json(X_AB.pose.matrix());
+  if (geodetic) {
+    const auto seen = geodetic_pose(X_AB);
+    object["geodetic"] = seen ? geodetic_json(*seen) : nlohmann::json();
+  }
   return object;
 }
 
 std::string Path::text(Source source, const Common& common, const StampedTransform& X_AB) const {
   std::string text = describe(X_AB, {common.angles, covariance, matrix}, X_AB.basis.unspecified);
   text += assumed_line(assumed_joints(source, a, b, X_AB.basis.unspecified));
+  if (geodetic) {
+    const auto seen = geodetic_pose(X_AB);
+    text +=
+        seen ? describe(*seen, common.angles) : "geodetic     none: " + seen.error().message + "\n";
+  }
   return text + stamp_line(source, common, a, b, X_AB.stamp);
 }
 

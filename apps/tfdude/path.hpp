@@ -16,7 +16,7 @@ namespace tfdude::cli {
 struct Path {
   /// Adds A and B.
   void add_ends(CLI::App& app);
-  /// Adds --cov and --matrix.
+  /// Adds --cov, --matrix and --geodetic.
   void add_printing(CLI::App& app);
 
   [[nodiscard]] nlohmann::json json(Source source, const StampedTransform& X_AB) const;
@@ -31,6 +31,7 @@ struct Path {
   std::string b;
   bool covariance = false;  ///< print the full one
   bool matrix = false;      ///< print the pose as a matrix
+  bool geodetic = false;    ///< A is an earth frame: print the place of B
 };
 
 /// The joints that move unspecified edges of the path, and have had no sample: their positions are

@@ -71,12 +71,13 @@ Result<EdgeUpdate> read_edge(const Json& object, const AngleUnit& angles) {
   }
   const auto id = object["edge"].get<std::string>();
   TransformSpec spec;
-  const auto read = check_keys(object, {"edge", "xyz", "rpy", "quat", "matrix", "stddev", "cov",
-                                        "covariance", "stamp", "stamp_ns"})
+  const auto read = check_keys(object, {"edge", "xyz", "rpy", "quat", "matrix", "geodetic",
+                                        "stddev", "cov", "covariance", "stamp", "stamp_ns"})
                         .and_then([&] { return read_numbers(object, "xyz", spec.xyz); })
                         .and_then([&] { return read_numbers(object, "rpy", spec.rpy); })
                         .and_then([&] { return read_numbers(object, "quat", spec.quat); })
                         .and_then([&] { return read_numbers(object, "matrix", spec.matrix); })
+                        .and_then([&] { return read_numbers(object, "geodetic", spec.geodetic); })
                         .and_then([&] { return read_numbers(object, "stddev", spec.stddev); })
                         .and_then([&] { return read_numbers(object, "cov", spec.cov); });
   if (!read) return fail_at("edge " + quote(id), read.error());
@@ -86,7 +87,8 @@ Result<EdgeUpdate> read_edge(const Json& object, const AngleUnit& angles) {
     }
     spec.covariance = object["covariance"].get<std::string>();
   }
-  if (!spec.xyz && !spec.gives_rotation()) return wrong("edge " + quote(id) + " has no pose");
+  if (!spec.gives_translation() && !spec.gives_rotation())
+    return wrong("edge " + quote(id) + " has no pose");
   auto X_PC = in_radians(std::move(spec), angles).build();
   if (!X_PC) return fail_at("edge " + quote(id), X_PC.error());
   return EdgeUpdate{id, *X_PC};

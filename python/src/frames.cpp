@@ -1,6 +1,7 @@
 #include <pybind11/stl.h>
 
 #include "tfdude/description/config.hpp"
+#include "tfdude/description/frame_file.hpp"
 #include "tfdude/description/urdf.hpp"
 #include "tfdude/types/frame.hpp"
 
@@ -82,6 +83,29 @@ std::vector<FrameSpec> load(std::string file, std::string root, const Transform&
   return value_of(load_urdf(part));
 }
 
+std::vector<FrameSpec> read_frames(std::string path, const std::optional<std::string>& format,
+                                   std::string prefix, std::map<std::string, std::string> names,
+                                   double unit, py::handle covariance, std::string covariances) {
+  FrameFile file;
+  file.file = std::move(path);
+  if (format) file.format = value_of(frame_format_named(*format));
+  file.prefix = std::move(prefix);
+  file.names = std::move(names);
+  file.unit = unit;
+  if (!covariance.is_none()) file.covariance = to_covariance(covariance);
+  file.covariances = std::move(covariances);
+  return value_of(load_frames(file));
+}
+
+py::dict sources_of(const FrameSpec& frame) {
+  py::dict sources;
+  for (const CommonError& error : frame.correlation.common_errors) {
+    const Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor> rows = error.loading;
+    sources[py::str(error.source)] = read_only(rows.data(), {6, rows.cols()});
+  }
+  return sources;
+}
+
 }  // namespace
 
 void bind_frames(py::module_& module) {
@@ -111,7 +135,13 @@ void bind_frames(py::module_& module) {
       .def_readonly("id", &FrameSpec::id)
       .def_readonly("parent", &FrameSpec::parent)
       .def_readonly("X_PC", &FrameSpec::X_PC, "The value at the start.")
-      .def_readonly("joint", &FrameSpec::joint);
+      .def_readonly("joint", &FrameSpec::joint)
+      .def_property_readonly(
+          "sources", &sources_of,
+          "Errors that it shares with other frames: for each source a (6, k) loading.")
+      .def_property_readonly(
+          "correlation_unknown", [](const FrameSpec& frame) { return frame.correlation.unknown; },
+          "Its own error may be correlated with any other.");
   py::class_<Config>(module, "Config", "The content of a daemon's YAML file.")
       .def_readonly("partition", &Config::partition, "Empty if the file names none.")
       .def_readonly("frames", &Config::frames);
@@ -124,6 +154,23 @@ void bind_frames(py::module_& module) {
              "Reads the frames of a robot, each moved by its joint.\n\n"
              "root: the frame in which the robot's root link is, at X_root. prefix: of all names.\n"
              "links: what to load, as LINK or FROM..TO; none: all.");
+  module.def(
+      "read_frames", &read_frames, py::arg("file"), py::kw_only(), py::arg("format") = py::none(),
+      py::arg("prefix") = "", py::arg("names") = std::map<std::string, std::string>{},
+      py::arg("unit") = 1.0, py::arg("covariance") = py::none(), py::arg("covariances") = "",
+      "Reads the edges of a calibration, launch file or pose graph, parents first.\n\n"
+      "format: 'kalibr', 'eye-on-hand', 'eye-on-base', 'ros1', 'ros2', 'opencv', 'colmap',\n"
+      "'g2o'; None: told from the content. prefix: of all names, but those that names gives,\n"
+      "by the name in the file. unit: of lengths in the file [m]. covariance: of edges for\n"
+      "which the file has none. covariances: the file of pycolmap's covariances. At most\n"
+      "64 MiB are read. Raises TransformException with file, line and key.");
+  module.def(
+      "write_frames",
+      [](const std::vector<FrameSpec>& frames, const std::string& format) {
+        return value_of(write_frames(frames, value_of(frame_format_named(format))));
+      },
+      py::arg("frames"), py::arg("format"),
+      "The text of a file with these edges, parents first; formats as of read_frames().");
 }
 
 }  // namespace tfdude::python

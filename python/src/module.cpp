@@ -1,6 +1,7 @@
 #include "tfdude/types/version.hpp"
 
 #include "bind.hpp"
+#include "earth.hpp"
 #include "session.hpp"
 
 PYBIND11_MODULE(_core, module) {
@@ -9,6 +10,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "The extension module of the package tfdude.";
   module.attr("__version__") = tfdude::program_version();
   bind_transform(module);
+  bind_earth(module);
   bind_points(module);
   bind_values(module);
   bind_frames(module);

@@ -4,6 +4,7 @@
 #include <pybind11/operators.h>
 
 #include "tfdude/base/number.hpp"
+#include "tfdude/math/earth.hpp"
 #include "tfdude/math/interpolate.hpp"
 #include "tfdude/math/perturbation.hpp"
 
@@ -131,6 +132,9 @@ void bind_parts(py::class_<Transform>& cls) {
   cls.def_property_readonly(
       "rpy", [](const Transform& X) { return from_vector3(to_rpy(X.pose.rotation())); },
       "Fixed-axis angles (roll, pitch, yaw) as in URDF [rad]; (3,).");
+  cls.def_property_readonly(
+      "geodetic", [](const Transform& X) { return value_of(geodetic_pose(X)); },
+      "Where the child is on the Earth, if the parent is an earth frame (ECEF): GeodeticPose.");
   cls.def_property_readonly(
       "complete", [](const Transform& X) { return X.covariance.complete(); },
       "Whether the covariance is specified, and that of each edge it was computed from.");

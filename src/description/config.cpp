@@ -23,8 +23,8 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kFileKeys = {"partition", "clock",  "covariance",
                                                        "history",   "frames", "urdf"};
-constexpr std::array<std::string_view, 12> kFrameKeys = {
-    "id",     "parent", "xyz",        "rpy",     "quat",        "matrix",
+constexpr std::array<std::string_view, 13> kFrameKeys = {
+    "id",     "parent", "xyz",        "rpy",     "quat",        "matrix", "geodetic",
     "stddev", "cov",    "covariance", "history", "correlation", "sources"};
 constexpr std::array<std::string_view, 7> kHistoryKeys = {
     "span", "count", "process_noise", "drifts", "moving", "max_ahead", "restart_after"};

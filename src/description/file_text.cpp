@@ -32,4 +32,10 @@ Result<std::string> read_text(const std::string& path) {
   return text;
 }
 
+tl::unexpected<Error> file_error(Errc code, const std::string& file, int line,
+                                 const std::string& message) {
+  const std::string place = line > 0 ? ":" + std::to_string(line) : "";
+  return fail(code, file + place + ": " + printable(message));
+}
+
 }  // namespace tfdude

@@ -11,4 +11,8 @@ namespace tfdude {
 /// @return kConfig naming the file: missing, a directory, not readable, too long.
 [[nodiscard]] Result<std::string> read_text(const std::string& path);
 
+/// An error about a place in a file: "arm.urdf:12: message". @param line  zero if unknown
+[[nodiscard]] tl::unexpected<Error> file_error(Errc code, const std::string& file, int line,
+                                               const std::string& message);
+
 }  // namespace tfdude

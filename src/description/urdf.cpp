@@ -17,7 +17,7 @@ namespace {
 
 tl::unexpected<Error> link_error(const UrdfTree& tree, const UrdfTree::Link& link,
                                  const std::string& message) {
-  return urdf_error(Errc::kInvalidInput, tree.file, link.line,
+  return file_error(Errc::kInvalidInput, tree.file, link.line,
                     "link " + quote(link.name) + ": " + message);
 }
 

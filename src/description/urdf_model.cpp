@@ -11,6 +11,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
+#include "description/file_text.hpp"
 
 namespace tfdude {
 namespace {
@@ -51,7 +52,7 @@ tl::unexpected<Error> refused(const UrdfText& text, const std::string& file,
       return message.find(named) != std::string::npos;
     };
     if (std::none_of(said.begin(), said.end(), names)) continue;
-    return urdf_error(Errc::kConfig, file, joint.line,
+    return file_error(Errc::kConfig, file, joint.line,
                       "joint " + quote(joint.name) + ": " + reason);
   }
   return fail(Errc::kConfig, file + ": " + reason);

@@ -12,6 +12,9 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "description/file_text.hpp"
+#include "description/xml_text.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -36,6 +39,8 @@ std::vector<Kept> kept_of(std::string_view type) {
   return kept;
 }
 
+constexpr const char* kRunXacro = ": run xacro first, and load its output";
+
 // Finds the first element of xacro: a file with macros is not yet a URDF.
 class XacroSearch final : public tinyxml2::XMLVisitor {
  public:
@@ -49,6 +54,10 @@ class XacroSearch final : public tinyxml2::XMLVisitor {
  private:
   const XMLElement* found_ = nullptr;
 };
+
+bool is_expression(const std::string& text) {
+  return text.find("${") != std::string::npos || text.find("$(") != std::string::npos;
+}
 
 // An attribute as XML defines it: a tab or line end in it is a space. Empty if there is none.
 std::string attribute(const XMLElement& element, const char* name) {
@@ -89,50 +98,6 @@ std::string described(const char* kind, const std::string& name) {
   return std::string(kind) + " " + quote(name);
 }
 
-// Turns "XML_ERROR_MISMATCHED_ELEMENT" into the style of all messages.
-std::string reason(const tinyxml2::XMLDocument& document) {
-  std::string name = document.ErrorName();
-  constexpr std::string_view kStart = "XML_ERROR_";
-  if (name.rfind(kStart, 0) == 0) name.erase(0, kStart.size());
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) {
-    return c == '_' ? ' ' : static_cast<char>(std::tolower(c));
-  });
-  return name;
-}
-
-// The line of an element with more attributes than any URDF has; 0: there is none. TinyXML compares
-// each with all before it, so a million of them would take hours.
-int line_of_too_many_attributes(std::string_view text) {
-  constexpr std::size_t kMost = 256;
-  const auto skip_to = [&text](std::size_t from, std::string_view end) {
-    const auto at = text.find(end, from);
-    return at == std::string_view::npos ? text.size() : at + end.size();
-  };
-  for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
-    const std::string_view rest = text.substr(at);
-    if (rest.rfind("<!--", 0) == 0) {
-      at = skip_to(at, "-->");
-      continue;
-    }
-    if (rest.rfind("<![CDATA[", 0) == 0) {
-      at = skip_to(at, "]]>");
-      continue;
-    }
-    const std::size_t begin = at;
-    std::size_t attributes = 0;
-    for (++at; at < text.size() && text[at] != '>'; ++at) {
-      if (text[at] == '=') ++attributes;
-      if (text[at] != '"' && text[at] != '\'') continue;
-      at = std::min(text.find(text[at], at + 1), text.size());
-      if (at == text.size()) break;
-    }
-    if (attributes <= kMost) continue;
-    return 1 + static_cast<int>(
-                   std::count(text.begin(), text.begin() + static_cast<long>(begin), '\n'));
-  }
-  return 0;
-}
-
 class TextReader {
  public:
   TextReader(UrdfText& text, const std::string& file) : text_(text), file_(file) {}
@@ -156,7 +121,15 @@ class TextReader {
  private:
   [[nodiscard]] tl::unexpected<Error> error(const XMLElement& element,
                                             const std::string& message) const {
-    return urdf_error(Errc::kInvalidInput, file_, element.GetLineNum(), message);
+    return file_error(Errc::kInvalidInput, file_, element.GetLineNum(), message);
+  }
+
+  // An expression of xacro would be a name like any other.
+  [[nodiscard]] Result<void> check_expanded(const XMLElement& element, const char* name) const {
+    const std::string value = attribute(element, name);
+    if (!is_expression(value)) return {};
+    return file_error(Errc::kConfig, file_, element.GetLineNum(),
+                      quote(value) + " is an expression of xacro" + kRunXacro);
   }
 
   void push(const XMLElement& element, const char* name) {
@@ -167,6 +140,7 @@ class TextReader {
   [[nodiscard]] Result<void> link(const XMLElement& element) {
     text_.links.push_back({attribute(element, "name"), element.GetLineNum()});
     if (text_.links.back().name.empty()) return error(element, "a link has no name");
+    if (auto ok = check_expanded(element, "name"); !ok) return ok;
     printer_.OpenElement("link");
     push(element, "name");
     printer_.CloseElement();
@@ -178,6 +152,9 @@ class TextReader {
     joint.name = attribute(element, "name");
     joint.line = element.GetLineNum();
     if (joint.name.empty()) return error(element, "a joint has no name");
+    for (const char* name : {"name", "type"}) {
+      if (auto ok = check_expanded(element, name); !ok) return ok;
+    }
     const std::string what = described("joint", joint.name);
     printer_.OpenElement("joint");
     push(element, "name");
@@ -206,6 +183,7 @@ class TextReader {
   [[nodiscard]] Result<void> read_quaternion(const XMLElement& origin, const std::string& what,
                                              UrdfText::Joint& joint) const {
     if (origin.Attribute("quat_xyzw") == nullptr) return {};
+    if (auto ok = check_expanded(origin, "quat_xyzw"); !ok) return ok;
     if (origin.Attribute("rpy") != nullptr) {
       return error(origin, what + ": rpy and quat_xyzw are both given, one is enough");
     }
@@ -245,6 +223,7 @@ class TextReader {
     printer_.OpenElement(kept.element);
     const bool limits = kept.element == std::string_view("limit");
     for (const char* name : kept.attributes) {
+      if (auto ok = check_expanded(part, name); !ok) return ok;
       // urdfdom logs a bad number as a format of printf, so it must contain no percent sign.
       const std::string value = attribute(part, name);
       const bool names = std::strcmp(name, "link") == 0 || std::strcmp(name, "joint") == 0;
@@ -267,48 +246,26 @@ class TextReader {
 
 }  // namespace
 
-tl::unexpected<Error> urdf_error(Errc code, const std::string& file, int line,
-                                 const std::string& message) {
-  const std::string place = line > 0 ? ":" + std::to_string(line) : "";
-  return fail(code, file + place + ": " + message);
-}
-
 Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file) {
-  if (const auto zero = text.find('\0'); zero != std::string::npos) {
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(zero), '\n');
-    return urdf_error(Errc::kConfig, file, static_cast<int>(line), "not XML: holds a zero byte");
-  }
-  if (const int line = line_of_too_many_attributes(text); line > 0) {
-    return urdf_error(Errc::kTooMuch, file, line, "an element has more than 256 attributes");
-  }
   tinyxml2::XMLDocument document;
-  if (document.Parse(text.data(), text.size()) == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) {
-    return fail(Errc::kConfig, file + ": is empty");
-  }
-  if (document.Error()) {
-    return urdf_error(Errc::kConfig, file, document.ErrorLineNum(), "not XML: " + reason(document));
-  }
-  const XMLElement* robot = document.RootElement();
+  const auto root = parse_xml(document, text, file);
+  if (!root) return tl::unexpected(root.error());
+  const XMLElement* robot = *root;
   if (robot == nullptr) return fail(Errc::kConfig, file + ": has no element <robot>");
   if (std::strcmp(robot->Name(), "robot") != 0) {
-    return urdf_error(Errc::kConfig, file, robot->GetLineNum(),
+    return file_error(Errc::kConfig, file, robot->GetLineNum(),
                       "not a URDF: <" + printable(robot->Name()) + "> instead of <robot>");
-  }
-  if (const auto* second = robot->NextSiblingElement()) {
-    return urdf_error(Errc::kConfig, file, second->GetLineNum(),
-                      "not XML: <" + printable(second->Name()) + "> after the end of <robot>");
   }
   XacroSearch search;
   robot->Accept(&search);
   if (search.found() != nullptr) {
-    return urdf_error(Errc::kConfig, file, search.found()->GetLineNum(),
-                      "<" + printable(search.found()->Name()) +
-                          "> is a xacro element: run xacro first, and load its output");
+    return file_error(Errc::kConfig, file, search.found()->GetLineNum(),
+                      "<" + printable(search.found()->Name()) + "> is a xacro element" + kRunXacro);
   }
   UrdfText found;
   if (auto ok = TextReader(found, file).robot(*robot); !ok) return tl::unexpected(ok.error());
   if (found.links.empty()) {
-    return urdf_error(Errc::kInvalidInput, file, robot->GetLineNum(), "has no links");
+    return file_error(Errc::kInvalidInput, file, robot->GetLineNum(), "has no links");
   }
   return found;
 }

@@ -30,11 +30,6 @@ struct UrdfText {
   std::string cleaned;  ///< a URDF with only these parts: all other parts may be malformed
 };
 
-/// An error for any Result. Its message starts with the place: "arm.urdf:12: ...".
-/// @param line  zero if unknown
-[[nodiscard]] tl::unexpected<Error> urdf_error(Errc code, const std::string& file, int line,
-                                               const std::string& message);
-
 /// @param file  for messages
 /// @return kConfig naming file and line: not XML, not a URDF, or a file for xacro; kInvalidInput: a
 /// link or joint without a name, a joint without its links, a duplicate element, a limit or a

@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "description/file_text.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -27,7 +29,7 @@ std::vector<std::size_t> links_below(const UrdfTree& tree, std::size_t top,
 
 tl::unexpected<Error> taken(const UrdfTree& tree, const char* kind, const std::string& name,
                             int line, int known) {
-  return urdf_error(Errc::kInvalidInput, tree.file, line,
+  return file_error(Errc::kInvalidInput, tree.file, line,
                     std::string(kind) + " " + quote(name) + ": the name is taken by the " + kind +
                         " in line " + std::to_string(known));
 }
@@ -80,7 +82,7 @@ Result<void> find_root(UrdfTree& tree) {
   for (std::size_t i = 0; i < tree.links.size(); ++i) {
     if (tree.links[i].joint) continue;
     if (root) {
-      return urdf_error(Errc::kInvalidInput, tree.file, tree.links[i].line,
+      return file_error(Errc::kInvalidInput, tree.file, tree.links[i].line,
                         "link " + quote(tree.links[i].name) + " is a second root link, beside " +
                             quote(tree.links[*root].name) + " in line " +
                             std::to_string(tree.links[*root].line));
@@ -140,7 +142,7 @@ Result<std::vector<std::size_t>> links_of(const UrdfTree& tree, const std::strin
 }  // namespace
 
 tl::unexpected<Error> UrdfTree::joint_error(std::size_t joint, const std::string& message) const {
-  return urdf_error(Errc::kInvalidInput, file, joints[joint].line,
+  return file_error(Errc::kInvalidInput, file, joints[joint].line,
                     "joint " + quote(joints[joint].name) + ": " + message);
 }
 

@@ -18,6 +18,7 @@ std::string_view blamed_key(const std::string& message, const TransformSpec& spe
   if (starts("translation")) return "xyz";
   if (starts("rpy")) return "rpy";
   if (starts("matrix")) return "matrix";
+  if (starts("geodetic")) return "geodetic";
   if (starts("rotation")) return "quat";
   if (starts("stddev")) return "stddev";
   if (starts("cov and")) return "cov";
@@ -154,6 +155,7 @@ Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fi
                         .and_then([&] { return numbers(fields, "rpy", place, spec.rpy); })
                         .and_then([&] { return numbers(fields, "quat", place, spec.quat); })
                         .and_then([&] { return numbers(fields, "matrix", place, spec.matrix); })
+                        .and_then([&] { return numbers(fields, "geodetic", place, spec.geodetic); })
                         .and_then([&] { return numbers(fields, "stddev", place, spec.stddev); })
                         .and_then([&] { return numbers(fields, "cov", place, spec.cov); });
   if (!read) return tl::unexpected(read.error());
@@ -168,7 +170,8 @@ Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fi
   const std::string_view key = blamed_key(message, spec);
   const auto field = fields.find(key);
   const bool named = message.rfind(std::string(key) + "[", 0) == 0 || key == "covariance" ||
-                     key == "matrix" || message.find("both given") != std::string::npos;
+                     key == "matrix" || key == "geodetic" ||
+                     message.find("both given") != std::string::npos;
   return error(X_PC.error().code, field == fields.end() ? node.Mark() : field->second.mark,
                place + ": " + (named ? "" : std::string(key) + ": ") + message);
 }

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "tfdude/math/earth.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -24,6 +26,17 @@ Result<Eigen::Quaterniond> rotation_of(const TransformSpec& spec) {
 }
 
 Result<Pose> pose_of(const TransformSpec& spec) {
+  if (spec.geodetic) {
+    if (spec.xyz || spec.matrix) {
+      return fail(Errc::kInvalidInput, "geodetic is given beside xyz or matrix, one is enough");
+    }
+    const auto& [latitude, longitude, altitude] = *spec.geodetic;
+    const auto X_EN = enu_pose({latitude, longitude, altitude});
+    if (!X_EN) return fail_at("geodetic", X_EN.error());
+    const auto R_NB = rotation_of(spec).and_then(
+        [](const Eigen::Quaterniond& q) { return Pose::create(q, Eigen::Vector3d::Zero()); });
+    return R_NB ? Result<Pose>(*X_EN * *R_NB) : R_NB;
+  }
   if (spec.matrix) {
     if (spec.xyz || spec.rpy || spec.quat) {
       return fail(Errc::kInvalidInput, "matrix is given beside xyz, rpy or quat, one is enough");

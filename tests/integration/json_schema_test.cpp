@@ -165,6 +165,16 @@ TEST_CASE("json: what each command prints is as the schema says") {
   checked.run(
       {"plot", "world", "hand_left", "--out", directory.path() + "/a.svg", "--samples", "5"});
   checked.run({"graph", "--out", directory.path() + "/a.dot"});
+  checked.run({"add", "earth", "--parent", "", "--partition", "arm"});
+  checked.run({"add", "site", "--parent", "earth", "--geodetic", "48", "11", "500", "--covariance",
+               "exact"});
+  checked.run({"lookup", "earth", "site", "--geodetic"});
+  checked.run({"lookup", "world", "camera", "--geodetic"});
+  const std::string launch = directory.path() + "/hand.launch";
+  checked.run({"export", "-", "hand_left", "--in", "world", "--format", "ros1"});
+  checked.run({"export", launch, "hand_left", "--in", "world", "--format", "ros2"});
+  checked.run({"import", launch, "--dry-run"});
+  checked.run({"import", launch, "--into", "arm", "--prefix", "seen_", "--name", "world=earth"});
   for (const char* command : {"watch", "echo"}) checked.start({command, "world", "tool"});
   const std::string file = directory.path() + "/all.mcap";
   Process recorder = d.domain.start_cli({"--json", "record", file});
@@ -227,7 +237,7 @@ TEST_CASE("json: the schema has every command, and refuses what it does not desc
     // web prints nothing for programs; keys has commands of its own.
     if (command != "web" && command != "keys") CHECK(commands.contains(command));
   }
-  CHECK(count == 36);
+  CHECK(count == 38);
   const json& roots = commands.at("roots");
   CHECK(schema.error(roots, {{"roots", {"a"}}}) == "");
   CHECK(schema.error(roots, {{"roots", {1}}}) != "");

@@ -201,4 +201,97 @@ TEST_CASE("values: points of one frame are given in another with their covarianc
   CHECK(robot.domain.cli({"point", "tool0", "nowhere", "1", "0", "0"}).status == 1);
 }
 
+TEST_CASE("values: frames of a calibration are imported, updated and exported") {
+  const Robot robot;
+  const auto camchain = [&](const char* baseline) {
+    return robot.directory.write("camchain.yaml",
+                                 std::string("cam0:\n  T_cam_imu: [0, 1, 0, 0.5,  -1, 0, 0, 0,  "
+                                             "0, 0, 1, 0,  0, 0, 0, 1]\n"
+                                             "cam1:\n  T_cn_cnm1: [1, 0, 0, ") +
+                                     baseline + ", 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n");
+  };
+  const Arguments options = {"--into", "arm", "--name", "imu0=tool0", "--prefix", "head_"};
+  const auto import = [&](const std::string& file, Arguments more = {}) {
+    Arguments arguments = {"import", file};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  CHECK(robot.text({"import", camchain("-0.1"), "--dry-run"}) ==
+        "cam0 in imu0: 0.000000  -0.500000  0.000000  m, 0.000000  0.000000  1.570796  rad\n"
+        "cam1 in cam0: 0.100000  0.000000  0.000000  m, 0.000000  0.000000  0.000000  rad\n");
+  CHECK(robot.answered({"exists", "head_cam0"}, 1).at("exists") == false);
+  const json imported = robot.answered(import(camchain("-0.1")));
+  CHECK(imported.at("done") == "imported");
+  CHECK(imported.at("frames").at(1).at("id") == "head_cam1");
+  const json seen = robot.answered({"lookup", "tool0", "head_cam1"});
+  CHECK(seen.at("translation").at(1).get<double>() == Approx(-0.4));
+  CHECK(seen.at("covariance").is_null());
+  // Again: other values, with a covariance.
+  robot.answered(import(camchain("-0.2"), {"--stddev", "1e-3", "1e-3", "1e-3", "0", "0", "0"}));
+  const json again = robot.answered({"lookup", "head_cam0", "head_cam1"});
+  CHECK(again.at("translation").at(0).get<double>() == Approx(0.2));
+  CHECK(again.at("covariance").at(0).at(0).get<double>() == Approx(1e-6));
+  // What is wrong changes nothing.
+  const CliResult wrong = robot.domain.cli(import(camchain("nought")));
+  CHECK(wrong.status == 2);
+  CHECK_THAT(wrong.err, ContainsSubstring("camchain.yaml:4: cam1: T_cn_cnm1 is 'nought'"));
+  const CliResult taken = robot.domain.cli(
+      {"import", camchain("-0.3"), "--into", "base", "--name", "imu0=tool0", "--prefix", "head_"});
+  CHECK(taken.status == 1);
+  CHECK_THAT(taken.err, ContainsSubstring("frame 'head_cam0' belongs to partition 'arm'"));
+  robot.text({"add", "below", "--parent", "head_cam1"});
+  const CliResult cycle = robot.domain.cli(
+      {"import", camchain("-0.3"), "--into", "arm", "--name", "imu0=below", "--prefix", "head_"});
+  CHECK(cycle.status == 1);
+  CHECK_THAT(cycle.err, ContainsSubstring("lies below it"));
+  CHECK(robot.answered({"lookup", "head_cam0", "head_cam1"}) == again);
+  // A parent that nobody has is a new root.
+  robot.answered({"import", camchain("-0.1"), "--into", "arm"});
+  CHECK(robot.answered({"parent", "imu0"}).at("parent").is_null());
+
+  const std::string out = robot.directory.path() + "/stereo.yml";
+  CHECK(robot.text({"export", out, "head_cam1", "--in", "head_cam0", "--format", "opencv"}) ==
+        "wrote " + out + "\n");
+  CHECK_THAT(robot.text({"import", out, "--dry-run"}),
+             ContainsSubstring("right in left: 0.200000  0.000000  0.000000  m"));
+  const json text = robot.answered({"export", "-", "--format", "ros2"});
+  CHECK_THAT(text.at("text").get<std::string>(),
+             ContainsSubstring("--frame-id tool0 --child-frame-id head_cam0"));
+  CHECK(robot.domain.cli({"export", "-", "nobody", "--format", "ros2"}).status == 1);
+  const CliResult exact = robot.domain.cli({"export", out, "head_cam1", "--format", "g2o"});
+  CHECK(exact.status == 1);
+  CHECK_THAT(exact.err, ContainsSubstring("an axis is known exactly"));
+}
+
+TEST_CASE("values: frames are placed and found by latitude and longitude") {
+  const Robot robot;
+  robot.text({"add", "earth", "--parent", "", "--partition", "base"});
+  robot.text({"add", "site", "--parent", "earth", "--geodetic", "48.137154", "11.576124", "519",
+              "--stddev", "0.02", "0.03", "0.05", "0", "0", "0.001"});
+  robot.text({"add", "car", "--parent", "site", "--xyz", "0", "0", "2", "--rpy", "0", "0", "0.5",
+              "--covariance", "exact"});
+  const json seen = robot.answered({"lookup", "earth", "car", "--geodetic"}).at("geodetic");
+  CHECK(seen.at("latitude").get<double>() == Approx(48.137154).epsilon(1e-12));
+  CHECK(seen.at("longitude").get<double>() == Approx(11.576124).epsilon(1e-12));
+  CHECK(seen.at("altitude").get<double>() == Approx(521));
+  CHECK(seen.at("rotation_enu").at(2).get<double>() == Approx(std::sin(0.25)));
+  CHECK(seen.at("stddev_enu").at(0).get<double>() == Approx(0.02));
+  CHECK(seen.at("utm").at("zone") == "32N");
+  CHECK_THAT(robot.text({"lookup", "earth", "car", "--geodetic"}),
+             ContainsSubstring("latitude     48.137154000 deg\n") &&
+                 ContainsSubstring("rpy to ENU   0.000000  0.000000  0.500000  rad\n") &&
+                 ContainsSubstring("std dev ENU  0.020000  0.030000  0.050000  m\n") &&
+                 ContainsSubstring("utm          32N  691"));
+  CHECK_THAT(robot.text({"lookup", "site", "car", "--geodetic"}),
+             ContainsSubstring("geodetic     none: not in an earth frame: the position is 2 m"));
+  CHECK(robot.answered({"lookup", "site", "car", "--geodetic"}).at("geodetic").is_null());
+  const CliResult wrong =
+      robot.domain.cli({"update", "site", "--geodetic", "91", "11.576124", "519"});
+  CHECK(wrong.status == 1);
+  CHECK_THAT(wrong.err, ContainsSubstring("latitude is 91, not within -90 and 90 degrees"));
+  CHECK(robot.domain.cli({"update", "site", "--geodetic", "1", "2", "3", "--xyz", "1", "2", "3"})
+            .status == 2);
+}
+
 }  // namespace tfdude

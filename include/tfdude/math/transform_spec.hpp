@@ -23,16 +23,23 @@ struct TFDUDE_EXPORT TransformSpec {
   std::optional<std::array<double, 4>> quat;  ///< x, y, z, w
   /// The pose instead of the fields above: a homogeneous matrix row by row
   std::optional<std::array<double, 16>> matrix;
+  /// Instead of a translation: latitude, longitude [deg] and altitude [m] in a parent whose origin
+  /// is the centre of the Earth (earth.hpp). The rotation is that in the axes east, north and up.
+  std::optional<std::array<double, 3>> geodetic;
   std::optional<std::array<double, 6>> stddev;  ///< three [m], three [rad]
   std::optional<Covariance::Upper> cov;         ///< upper triangle row by row
   std::optional<std::string> covariance;        ///< instead of both: see covariance_named()
 
   [[nodiscard]] bool gives_covariance() const { return stddev || cov || covariance; }
-  [[nodiscard]] bool gives_rotation() const { return rpy || quat || matrix; }
-  [[nodiscard]] bool empty() const { return !xyz && !gives_rotation() && !gives_covariance(); }
+  [[nodiscard]] bool gives_translation() const { return xyz || matrix || geodetic; }
+  [[nodiscard]] bool gives_rotation() const { return rpy || quat || matrix || geodetic; }
+  [[nodiscard]] bool empty() const {
+    return !gives_translation() && !gives_rotation() && !gives_covariance();
+  }
 
   /// @param otherwise  the covariance if none is given
   /// @return kInvalidInput naming the field: both rpy and quat, matrix beside one of them or xyz,
+  ///   geodetic beside xyz or matrix,
   ///   two of stddev, cov and covariance, or a field that Pose, Covariance or covariance_named()
   ///   rejects.
   [[nodiscard]] Result<Transform> build(const StatedCovariance& otherwise = {}) const;

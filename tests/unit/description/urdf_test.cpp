@@ -115,6 +115,18 @@ TEST_CASE("urdf: text that is not a URDF is rejected") {
   bad(std::string("<robot>\n\0</robot>", 17), "r.urdf:2: not XML: holds a zero byte");
   bad(robot("<link name=\"a\">\n<xacro:wheel/></link>"),
       "r.urdf:3: <xacro:wheel> is a xacro element: run xacro first, and load its output");
+  // What else of xacro is left, where it would become a name or a number.
+  const std::string run = " is an expression of xacro: run xacro first, and load its output";
+  for (const std::string word : {"${side}_wheel", "$(arg side)"}) {
+    bad("<robot>\n<link name=\"" + word + "\"/></robot>", "r.urdf:2: '" + word + "'" + run);
+    const std::string joint =
+        "<link name=\"a\"/><link name=\"b\"/>\n<joint name=\"j\" type=\"fixed\">";
+    bad("<robot>" + joint + "<parent link=\"" + word + "\"/><child link=\"b\"/></joint></robot>",
+        "r.urdf:2: '" + word + "'" + run);
+    bad("<robot>" + joint + "<origin rpy=\"0 0 " + word +
+            "\"/><parent link=\"a\"/><child link=\"b\"/></joint></robot>",
+        "r.urdf:2: '0 0 " + word + "'" + run);
+  }
   bad(pair("rotary"), "r.urdf:4: joint 'j': Joint [j] has no known type [rotary]");
   bad(pair("revolute"),
       "r.urdf:4: joint 'j': Joint [j] is of type REVOLUTE but it does not specify limits");

@@ -1,0 +1,265 @@
+// Lines that start static_transform_publisher: launch files of ROS 1 and ROS 2, in XML and Python,
+// and shell scripts.
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "tfdude/base/id.hpp"
+
+#include "description/file_edges.hpp"
+#include "description/file_text.hpp"
+#include "description/python_tokens.hpp"
+#include "description/xml_text.hpp"
+#include "types/ros_rules.hpp"
+
+namespace tfdude {
+namespace {
+
+using tinyxml2::XMLElement;
+using Words = std::vector<std::string>;
+
+constexpr const char* kProgram = "static_transform_publisher";
+
+// One start of the program.
+struct Start {
+  Words words;         // its arguments
+  bool of_tf = false;  // of the package tf, whose last argument is a period
+  int line = 0;
+};
+
+Words split(std::string_view text) {
+  Words words;
+  std::string line(text);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  for (const std::string_view word : words_of(line)) words.emplace_back(word);
+  return words;
+}
+
+class Arguments {
+ public:
+  Arguments(Start start, const std::string& name) : start_(std::move(start)), name_(name) {}
+
+  [[nodiscard]] Result<FileEdge> edge() {
+    Words& words = start_.words;
+    words.erase(std::find(words.begin(), words.end(), "--ros-args"), words.end());
+    // Names and remappings of ROS 1.
+    const auto is_mapping = [](const std::string& word) {
+      return word.find(":=") != std::string::npos;
+    };
+    words.erase(std::remove_if(words.begin(), words.end(), is_mapping), words.end());
+    for (const std::string& word : words) {
+      if (word.find("$(") == std::string::npos) continue;
+      return error(quote(word) + " is a substitution: put its value there");
+    }
+    const bool flags = std::any_of(words.begin(), words.end(), [](const std::string& word) {
+      return word.rfind("--", 0) == 0;
+    });
+    return flags ? flagged() : positional();
+  }
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> error(const std::string& message) const {
+    return file_error(Errc::kInvalidInput, name_, start_.line,
+                      std::string(kProgram) + ": " + message);
+  }
+
+  // --x 1 --yaw 0.5 --frame-id map --child-frame-id odom: what is left out is zero.
+  [[nodiscard]] Result<FileEdge> flagged() const {
+    std::map<std::string, double> numbers = {
+        {"--x", 0},   {"--y", 0},  {"--z", 0},  {"--roll", 0}, {"--pitch", 0},
+        {"--yaw", 0}, {"--qx", 0}, {"--qy", 0}, {"--qz", 0},   {"--qw", 1}};
+    std::map<std::string, std::string> frames = {{"--frame-id", ""}, {"--child-frame-id", ""}};
+    bool quaternion = false;
+    bool angles = false;
+    for (std::size_t i = 0; i < start_.words.size(); i += 2) {
+      const std::string& flag = start_.words[i];
+      if (i + 1 == start_.words.size()) return error(quote(flag) + " has no value");
+      const std::string& word = start_.words[i + 1];
+      if (const auto frame = frames.find(flag); frame != frames.end()) {
+        frame->second = word;
+        continue;
+      }
+      const auto found = numbers.find(flag);
+      if (found == numbers.end()) return error("unknown argument " + quote(flag));
+      const auto value = number_of(word);
+      if (!value) return error(flag + " is " + quote(word) + ", which is not a number");
+      found->second = *value;
+      quaternion = quaternion || flag[2] == 'q';
+      angles = angles || flag.size() > 4;
+    }
+    if (quaternion && angles) return error("a quaternion and angles are both given");
+    const auto value = [&](const char* flag) { return numbers.find(flag)->second; };
+    const Eigen::Quaterniond rotation =
+        quaternion ? Eigen::Quaterniond(value("--qw"), value("--qx"), value("--qy"), value("--qz"))
+                   : from_rpy(value("--roll"), value("--pitch"), value("--yaw"));
+    return made(rotation, {value("--x"), value("--y"), value("--z")}, frames["--frame-id"],
+                frames["--child-frame-id"]);
+  }
+
+  // x y z yaw pitch roll PARENT CHILD, or x y z qx qy qz qw PARENT CHILD; in tf with a period.
+  [[nodiscard]] Result<FileEdge> positional() const {
+    const Words& words = start_.words;
+    const auto is_number = [&](std::size_t i) { return number_of(words[i]).has_value(); };
+    bool quaternion = words.size() == 10;
+    if (words.size() == 9) {
+      const bool period = is_number(8) && (!is_number(6) || start_.of_tf);
+      quaternion = !period;
+    } else if (words.size() != 8 && words.size() != 10) {
+      return error("has " + std::to_string(words.size()) +
+                   " arguments, but 8 are needed (x y z yaw pitch roll PARENT CHILD) or 9 "
+                   "(x y z qx qy qz qw PARENT CHILD), and in tf a period");
+    }
+    std::vector<double> numbers;
+    for (std::size_t i = 0; i < (quaternion ? 7U : 6U); ++i) {
+      const auto value = number_of(words[i]);
+      if (!value) return error(quote(words[i]) + " is not a number");
+      numbers.push_back(*value);
+    }
+    const std::size_t first = numbers.size();
+    const Eigen::Quaterniond rotation =
+        quaternion ? Eigen::Quaterniond(numbers[6], numbers[3], numbers[4], numbers[5])
+                   : from_rpy(numbers[5], numbers[4], numbers[3]);
+    return made(rotation, {numbers[0], numbers[1], numbers[2]}, words[first], words[first + 1]);
+  }
+
+  [[nodiscard]] Result<FileEdge> made(const Eigen::Quaterniond& rotation,
+                                      const Eigen::Vector3d& translation, std::string_view parent,
+                                      std::string_view child) const {
+    FileEdge edge;
+    edge.line = start_.line;
+    edge.frame.parent = ros::without_slashes(parent);
+    edge.frame.id = ros::without_slashes(child);
+    if (edge.frame.parent.empty()) return error("has no parent frame");
+    if (edge.frame.id.empty()) return error("has no child frame");
+    const auto pose = ros::pose_of(rotation, translation);
+    if (!pose) return error(pose.error().message);
+    edge.frame.X_PC.pose = *pose;
+    return edge;
+  }
+
+  Start start_;
+  const std::string& name_;
+};
+
+// Whether the conditions of an element hold.
+Result<bool> holds(const XMLElement& element, const std::string& name) {
+  for (const bool wanted : {true, false}) {
+    const char* said = element.Attribute(wanted ? "if" : "unless");
+    if (said == nullptr) continue;
+    const std::string_view word = said;
+    const bool yes = word == "true" || word == "1" || word == "True";
+    if (!yes && word != "false" && word != "0" && word != "False") {
+      return file_error(Errc::kInvalidInput, name, element.GetLineNum(),
+                        std::string("<") + element.Name() + "> depends on " + quote(said) +
+                            ": put true or false there");
+    }
+    if (yes != wanted) return false;
+  }
+  return true;
+}
+
+bool is_value(const char* attribute, const char* value) {
+  return attribute != nullptr && std::strcmp(attribute, value) == 0;
+}
+
+// Finds the elements that start the program, in the order of the file.
+class StartSearch final : public tinyxml2::XMLVisitor {
+ public:
+  [[nodiscard]] const std::vector<const XMLElement*>& found() const { return found_; }
+
+  bool VisitEnter(const XMLElement& element, const tinyxml2::XMLAttribute* /*first*/) override {
+    const bool node = std::strcmp(element.Name(), "node") == 0;
+    const bool named = is_value(element.Attribute("type"), kProgram) ||
+                       is_value(element.Attribute("exec"), kProgram);
+    if (node && named) found_.push_back(&element);
+    return true;
+  }
+
+ private:
+  std::vector<const XMLElement*> found_;
+};
+
+Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::string& name) {
+  tinyxml2::XMLDocument document;
+  const auto root = parse_xml(document, text, name);
+  if (!root) return tl::unexpected(root.error());
+  StartSearch search;
+  if (*root != nullptr) (*root)->Accept(&search);
+  std::vector<Start> starts;
+  for (const XMLElement* node : search.found()) {
+    Result<bool> happens = true;
+    for (const auto* outer = node; happens && *happens && outer != nullptr;) {
+      happens = holds(*outer, name);
+      outer = outer->Parent() == nullptr ? nullptr : outer->Parent()->ToElement();
+    }
+    if (!happens) return tl::unexpected(std::move(happens.error()));
+    if (!*happens) continue;
+    const char* arguments = node->Attribute("args");
+    starts.push_back({split(arguments == nullptr ? "" : arguments),
+                      is_value(node->Attribute("pkg"), "tf"), node->GetLineNum()});
+  }
+  return starts;
+}
+
+// The lines of a shell script that start the program, each up to its ampersand or comment.
+std::vector<Start> starts_in_shell(const std::string& text) {
+  std::vector<Start> starts;
+  TextLines lines(text);
+  while (lines.next()) {
+    const int number = lines.number();
+    std::string line(lines.line());
+    const auto continues = [&] { return !line.empty() && line.back() == '\\'; };
+    while (continues()) {
+      line.back() = ' ';
+      if (!lines.next()) break;
+      line += lines.line();
+    }
+    line.resize(std::min({line.find('#'), line.find('&'), line.find(';'), line.size()}));
+    const std::size_t at = line.find(kProgram);
+    if (at == std::string::npos) continue;
+    Start start{{}, false, number};
+    const Words before = split(line.substr(0, at));
+    start.of_tf = !before.empty() && before.back() == "tf";
+    for (std::string word : split(line.substr(at + std::strlen(kProgram)))) {
+      word.erase(
+          std::remove_if(word.begin(), word.end(), [](char c) { return c == '"' || c == '\''; }),
+          word.end());
+      start.words.push_back(std::move(word));
+    }
+    starts.push_back(std::move(start));
+  }
+  return starts;
+}
+
+Result<std::vector<Start>> starts_in_python(const std::string& text, const std::string& name) {
+  auto calls = python_arguments(text, kProgram, name);
+  if (!calls) return tl::unexpected(std::move(calls.error()));
+  std::vector<Start> starts;
+  for (PythonArguments& call : *calls) starts.push_back({std::move(call.words), false, call.line});
+  return starts;
+}
+
+Result<std::vector<Start>> starts_of(const std::string& text, const std::string& name) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string::npos && text[first] == '<') return starts_in_xml(text, name);
+  if (text.find("LaunchDescription") != std::string::npos) return starts_in_python(text, name);
+  return starts_in_shell(text);
+}
+
+}  // namespace
+
+FileEdges read_launch(const std::string& text, const std::string& name) {
+  auto starts = starts_of(text, name);
+  if (!starts) return tl::unexpected(std::move(starts.error()));
+  std::vector<FileEdge> edges;
+  for (Start& start : *starts) {
+    auto edge = Arguments(std::move(start), name).edge();
+    if (!edge) return tl::unexpected(std::move(edge.error()));
+    edges.push_back(*std::move(edge));
+  }
+  return edges;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,204 @@
+#include "description/python_tokens.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "description/file_edges.hpp"
+#include "description/file_text.hpp"
+
+namespace tfdude {
+namespace {
+
+struct Token {
+  enum class Kind { kString, kWord, kSign };  // kWord: a name or a number
+  Kind kind = Kind::kSign;
+  std::string text;  // of a string its content
+  int line = 0;
+  std::size_t other = 0;  // of a bracket: its counterpart; of others: that which they stand in
+};
+
+constexpr std::size_t kNone = SIZE_MAX;
+
+bool is_word(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.';
+}
+
+class Tokens {
+ public:
+  Tokens(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+
+  [[nodiscard]] Result<std::vector<Token>> all() {
+    while (at_ < text_.size()) {
+      const char c = text_[at_];
+      if (c == '#') {
+        at_ = std::min(text_.find('\n', at_), text_.size());
+      } else if (c == '"' || c == '\'') {
+        if (auto ok = string(); !ok) return tl::unexpected(ok.error());
+      } else if (is_word(c)) {
+        word();
+      } else {
+        if (auto ok = sign(c); !ok) return tl::unexpected(ok.error());
+      }
+    }
+    if (open_.empty()) return std::move(tokens_);
+    return file_error(Errc::kConfig, file_, tokens_[open_.back()].line, "a bracket is not closed");
+  }
+
+ private:
+  [[nodiscard]] Result<void> string() {
+    const std::string_view rest = text_.substr(at_);
+    const bool is_long = rest.size() >= 3 && rest[1] == rest[0] && rest[2] == rest[0];
+    const std::string quote(is_long ? 3 : 1, rest[0]);
+    Token token{Token::Kind::kString, {}, line_, 0};
+    at_ += quote.size();
+    while (text_.substr(at_, quote.size()) != quote) {
+      if (at_ < text_.size() && text_[at_] == '\\') {
+        token.text += text_[at_++];
+      }
+      if (at_ >= text_.size() || (text_[at_] == '\n' && !is_long)) {
+        return file_error(Errc::kConfig, file_, token.line, "a string has no end");
+      }
+      if (text_[at_] == '\n') ++line_;
+      token.text += text_[at_++];
+    }
+    at_ += quote.size();
+    add(std::move(token));
+    return {};
+  }
+
+  void add(Token token) {
+    token.other = open_.empty() ? kNone : open_.back();
+    tokens_.push_back(std::move(token));
+  }
+
+  void word() {
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && is_word(text_[at_])) {
+      const bool exponent = text_[at_] == 'e' || text_[at_] == 'E';
+      const bool number = std::isdigit(static_cast<unsigned char>(text_[begin])) != 0;
+      ++at_;
+      const bool has_sign = at_ < text_.size() && (text_[at_] == '-' || text_[at_] == '+');
+      if (exponent && number && has_sign) ++at_;
+    }
+    add({Token::Kind::kWord, std::string(text_.substr(begin, at_ - begin)), line_, 0});
+  }
+
+  [[nodiscard]] Result<void> sign(char c) {
+    ++at_;
+    if (c == '\n') ++line_;
+    if (std::isspace(static_cast<unsigned char>(c)) != 0 || c == '\\') return {};
+    add({Token::Kind::kSign, std::string(1, c), line_, 0});
+    if (c == '(' || c == '[' || c == '{') open_.push_back(tokens_.size() - 1);
+    if (c != ')' && c != ']' && c != '}') return {};
+    if (open_.empty()) return file_error(Errc::kConfig, file_, line_, "a bracket was not opened");
+    tokens_.back().other = open_.back();
+    tokens_[open_.back()].other = tokens_.size() - 1;
+    open_.pop_back();
+    return {};
+  }
+
+  std::string_view text_;
+  const std::string& file_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+  std::vector<Token> tokens_;
+  std::vector<std::size_t> open_;
+};
+
+class Calls {
+ public:
+  Calls(const std::vector<Token>& tokens, const std::string& file) : tokens_(tokens), file_(file) {}
+
+  // The arguments of the call, or of the list, that begins at `open` and has this token.
+  [[nodiscard]] Result<std::optional<PythonArguments>> around(std::size_t open,
+                                                              std::size_t named) const {
+    if (is(open, "[")) return items(named + 2, tokens_[open].other);  // after the comma
+    if (!is(open, "(")) return std::nullopt;
+    for (std::size_t i = open + 1; i < tokens_[open].other; ++i) {
+      if (is(i, "(") || is(i, "[") || is(i, "{")) {
+        i = tokens_[i].other;
+      } else if (!is_string(i) && tokens_[i].text == "arguments" && is(i + 1, "=")) {
+        return value(i + 2);
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] bool is(std::size_t i, std::string_view sign) const {
+    return i < tokens_.size() && tokens_[i].kind == Token::Kind::kSign && tokens_[i].text == sign;
+  }
+  [[nodiscard]] bool is_string(std::size_t i) const {
+    return i < tokens_.size() && tokens_[i].kind == Token::Kind::kString;
+  }
+
+  [[nodiscard]] tl::unexpected<Error> computed(std::size_t i) const {
+    const Token& token = tokens_[std::min(i, tokens_.size() - 1)];
+    return file_error(Errc::kInvalidInput, file_, token.line,
+                      "an argument is computed by '" + token.text + "': put its value there");
+  }
+
+  [[nodiscard]] Result<std::optional<PythonArguments>> value(std::size_t i) const {
+    if (is(i, "[")) return items(i + 1, tokens_[i].other);
+    if (!is_string(i) || i + 1 >= tokens_.size() || tokens_[i + 1].text != ".split") {
+      return computed(i);
+    }
+    PythonArguments arguments{{}, tokens_[i].line};
+    for (const auto word : words_of(tokens_[i].text)) arguments.words.emplace_back(word);
+    return std::optional(std::move(arguments));
+  }
+
+  // Items of a list: strings, numbers with a sign, or either of them in str().
+  [[nodiscard]] Result<std::optional<PythonArguments>> items(std::size_t i, std::size_t end) const {
+    PythonArguments arguments{{}, tokens_[std::min(i, end)].line};
+    while (i < end) {
+      const bool wrapped = tokens_[i].text == "str" && is(i + 1, "(");
+      if (wrapped) i += 2;
+      std::string word;
+      if (!is_string(i)) {
+        if (is(i, "-")) word = tokens_[i++].text;
+        if (tokens_[i].kind != Token::Kind::kWord || !number_of(tokens_[i].text)) {
+          return computed(i);
+        }
+      }
+      arguments.words.push_back(word + tokens_[i++].text);
+      if (wrapped && !is(i++, ")")) return computed(i - 1);
+      if (i < end && !is(i++, ",")) return computed(i - 1);
+    }
+    return std::optional(std::move(arguments));
+  }
+
+  const std::vector<Token>& tokens_;
+  const std::string& file_;
+};
+
+}  // namespace
+
+Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
+                                                      const std::string& program,
+                                                      const std::string& file) {
+  const auto tokens = Tokens(text, file).all();
+  if (!tokens) return tl::unexpected(tokens.error());
+  const Calls calls(*tokens, file);
+  std::vector<PythonArguments> found;
+  std::size_t read = kNone;  // each bracket is read once, so that the work is bounded
+  for (std::size_t i = 0; i < tokens->size(); ++i) {
+    const Token& token = (*tokens)[i];
+    if (token.kind != Token::Kind::kString || token.text != program) continue;
+    if (token.other == kNone || token.other == read) continue;
+    read = token.other;
+    auto arguments = calls.around(token.other, i);
+    if (!arguments) return tl::unexpected(std::move(arguments.error()));
+    if (!*arguments) continue;
+    (*arguments)->line = token.line;
+    found.push_back(**std::move(arguments));
+  }
+  return found;
+}
+
+}  // namespace tfdude
