@@ -109,7 +109,7 @@ class LinuxMemory final : public SharedMemory {
   }
 
   Result<OwnMemory> create(std::size_t size) override;
-  Result<MemoryOffer> offer(std::uint64_t layout) override;
+  Result<MemoryOffer> offer(std::uint64_t layout, std::function<void(bool)> on_waiting) override;
   Result<MappedMemory> attach(const MemoryOffer& offer, std::uint64_t layout,
                               std::function<void(bool)> on_end) override;
 
@@ -119,6 +119,7 @@ class LinuxMemory final : public SharedMemory {
     Descriptor socket;
     Clock::time_point since;
     bool admitted = false;
+    bool waits = false;  // for what is written
   };
   // The owner of memory that is read here.
   struct Owner {
@@ -149,11 +150,13 @@ class LinuxMemory final : public SharedMemory {
   Descriptor wake_;
   Descriptor memory_;
   std::optional<MemoryOffer> offer_;
+  std::function<void(bool)> on_waiting_;
   Descriptor listening_ TFDUDE_GUARDED_BY(mutex_);
   std::uint64_t next_ TFDUDE_GUARDED_BY(mutex_) = 0;
   const std::shared_ptr<Watched> watched_ = std::make_shared<Watched>();
   // Of the thread.
   std::vector<Reader> readers_;
+  bool any_waits_ = false;
   Clock::time_point admits_from_{};
 };
 
@@ -189,13 +192,14 @@ Result<void> LinuxMemory::start() {
   return {};
 }
 
-Result<MemoryOffer> LinuxMemory::offer(std::uint64_t layout) {
+Result<MemoryOffer> LinuxMemory::offer(std::uint64_t layout, std::function<void(bool)> on_waiting) {
   MemoryOffer offered{kernel_, random_name(), {random_number(), random_number() | 1U}, layout, 0,
                       {}};
   auto listening = listen_at(offered.socket);
   if (!listening) return tl::unexpected(std::move(listening.error()));
   const Lock lock(mutex_);
   offer_ = offered;
+  on_waiting_ = std::move(on_waiting);
   listening_ = *std::move(listening);
   if (auto started = start(); !started) return tl::unexpected(std::move(started.error()));
   wake();
@@ -246,6 +250,13 @@ Result<MappedMemory> LinuxMemory::attach(const MemoryOffer& offer, std::uint64_t
     watched_->owners[number] = {*std::move(socket), std::move(on_end)};
   }
   wake();
+  const auto tell_waiting = [number, watched = watched_](bool waits) {
+    const Lock owners(watched->mutex);
+    const auto found = watched->owners.find(number);
+    Wish wish;
+    wish.waits = waits ? 1 : 0;
+    if (found != watched->owners.end()) (void)send_wish(found->second.socket, wish);
+  };
   // The connection ends with the memory.
   return MappedMemory{{at,
                        [memory, number, watched = watched_](const void*) {
@@ -255,8 +266,10 @@ Result<MappedMemory> LinuxMemory::attach(const MemoryOffer& offer, std::uint64_t
                          if (found == watched->owners.end()) return;
                          ended = std::move(found->second);
                          watched->owners.erase(found);
+                         hang_up(ended.socket);
                        }},
-                      size};
+                      size,
+                      tell_waiting};
 }
 
 void LinuxMemory::run() {
@@ -323,13 +336,18 @@ void LinuxMemory::admit() {
   }
 }
 
-// A reader that was admitted says nothing more, so whatever comes is the end.
+// Whatever a reader says that was admitted, except what it wishes, is the end.
 void LinuxMemory::listen_to_readers(const std::vector<pollfd>& polled, std::size_t first) {
   const Clock::time_point now = Clock::now();
   std::size_t i = first;
   const auto leaves = [&](Reader& reader) {
     const bool spoke = polled[i++].revents != 0;
-    if (reader.admitted) return spoke;
+    if (reader.admitted) {
+      Wish wish;
+      const bool ends = spoke && !receive_wish(reader.socket, wish);
+      if (spoke) reader.waits = wish.waits != 0;
+      return ends;
+    }
     if (!spoke) return now - reader.since > kPatience;
     Hello hello;
     const bool may = receive_hello(reader.socket, hello) && hello.token == offer_->token[0] &&
@@ -343,6 +361,9 @@ void LinuxMemory::listen_to_readers(const std::vector<pollfd>& polled, std::size
     if (!leaves(reader)) stay.push_back(std::move(reader));
   }
   readers_ = std::move(stay);
+  const bool any_waits = std::any_of(readers_.begin(), readers_.end(),
+                                     [](const Reader& reader) { return reader.waits; });
+  if (std::exchange(any_waits_, any_waits) != any_waits && on_waiting_) on_waiting_(any_waits);
 }
 
 }  // namespace

@@ -21,6 +21,8 @@ struct OwnMemory {
 struct MappedMemory {
   std::shared_ptr<const void> at;
   std::size_t size = 0;
+  /// Tells its owner whether somebody here waits for what it writes.
+  std::function<void(bool waits)> tell_waiting{};
 };
 
 /// How processes of one computer read each other's memory. Nothing is sent through it: requests and
@@ -35,8 +37,10 @@ class SharedMemory {
 
   /// From now on who shows the token of the offer may read what was created last. Once.
   /// @param layout  what readers must have in common with this process
+  /// @param on_waiting  called by another thread: whether any reader waits for what is written
   /// @return the offer, without an incarnation; kUnsupported
-  [[nodiscard]] virtual Result<MemoryOffer> offer(std::uint64_t layout) = 0;
+  [[nodiscard]] virtual Result<MemoryOffer> offer(std::uint64_t layout,
+                                                  std::function<void(bool waits)> on_waiting) = 0;
 
   /// Waits for the other process, but at most for 200 ms.
   /// @param on_end  called at most once, by another thread: the memory is not offered any more, and

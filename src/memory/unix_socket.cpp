@@ -76,6 +76,17 @@ bool receive_hello(const Descriptor& socket, Hello& hello) {
   return size == sizeof(hello) && hello.magic == Hello().magic;
 }
 
+void hang_up(const Descriptor& socket) { (void)shutdown(socket.get(), SHUT_RDWR); }
+
+bool send_wish(const Descriptor& socket, const Wish& wish) {
+  return send(socket.get(), &wish, sizeof(wish), MSG_NOSIGNAL) == sizeof(wish);
+}
+
+bool receive_wish(const Descriptor& socket, Wish& wish) {
+  const auto size = recv(socket.get(), &wish, sizeof(wish), MSG_DONTWAIT);
+  return size == sizeof(wish) && wish.magic == Wish().magic;
+}
+
 bool send_welcome(const Descriptor& socket, const Welcome& welcome, int memory) {
   Welcome copy = welcome;
   iovec bytes{&copy, sizeof(copy)};

@@ -42,6 +42,12 @@ struct Welcome {
   std::uint64_t token = 0;  ///< the second half, which shows that it is the owner; 0: rejected
 };
 
+/// What a reader says later: whether it waits for what the owner writes.
+struct Wish {
+  std::uint64_t magic = 0x48534957'48464454;
+  std::uint64_t waits = 0;
+};
+
 /// @return kUnsupported
 [[nodiscard]] Result<Descriptor> listen_at(const std::string& name);
 /// @return kUnsupported: nobody listens there
@@ -52,6 +58,13 @@ struct Welcome {
 [[nodiscard]] bool send_hello(const Descriptor& socket, const Hello& hello);
 /// Without waiting.
 [[nodiscard]] bool receive_hello(const Descriptor& socket, Hello& hello);
+/// Lets the other side know at once, although another thread may be waiting for the socket.
+void hang_up(const Descriptor& socket);
+
+bool send_wish(const Descriptor& socket, const Wish& wish);
+/// Without waiting.
+[[nodiscard]] bool receive_wish(const Descriptor& socket, Wish& wish);
+
 /// @param memory  -1: none
 [[nodiscard]] bool send_welcome(const Descriptor& socket, const Welcome& welcome, int memory);
 /// Without waiting.

@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/log.hpp"
+#include "memory/waiting.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/requests.hpp"
 
@@ -27,9 +28,15 @@ constexpr std::chrono::seconds kRetryAfter{30};
 // longest silence that DDS allows.
 constexpr std::chrono::milliseconds kNoticedLater{2300};
 
+// How many owners that are gone are remembered; each takes the memory that it had.
+constexpr std::size_t kMostGone = 8;
+
+// How long those are let alone who wait for commits, while these come one after the other.
+constexpr std::chrono::microseconds kWakeEvery{200};
+
 }  // namespace
 
-MemoryReads::MemoryReads(const Context& context, ProcessMemory& memory)
+MemoryReads::MemoryReads(const Context& context, ProcessMemory& memory, Watchers watchers)
     : structure_(context.structure),
       member_(context.member),
       requests_(context.requests),
@@ -37,14 +44,29 @@ MemoryReads::MemoryReads(const Context& context, ProcessMemory& memory)
       // A client that follows only some frames has no structure to walk.
       reads_(memory.port != nullptr && !context.options.follow),
       timeout_(context.options.timeout),
-      job_(context.threads.asking, [this] { return run(); }) {}
+      watchers_(std::move(watchers)),
+      job_(context.threads.asking, [this] { return run(); }),
+      wake_job_(
+          context.threads.push,
+          [this] {
+            wake_waiting(memory_.arena->roots().committed);
+            return Loop::kNever;
+          },
+          kWakeEvery),
+      waits_([this] { return watchers_.committed(); }) {}
 
 void MemoryReads::stop() {
+  waits_.stop();
   job_.stop();
   std::unique_ptr<SharedMemory> port;
-  const Lock lock(offer_mutex_);
-  offer_.emplace();
-  port = std::move(memory_.port);
+  {
+    const Lock lock(offer_mutex_);
+    offer_.emplace();
+    port = std::move(memory_.port);
+  }
+  port.reset();
+  set_waited(false);
+  wake_job_.stop();
 }
 
 // ---- reading
@@ -78,7 +100,8 @@ void MemoryReads::find_all() {
 
 Loop::Clock::time_point MemoryReads::run() {
   attach_wanted();
-  if (edges_.take_used()) renew();
+  const bool watched = kept_.take_used();
+  if (edges_.take_used() || watched) renew();
   return edges_.any() ? Clock::now() + kRenewAfter : Loop::kNever;
 }
 
@@ -129,11 +152,18 @@ void MemoryReads::attach(Owner owner) {
   if (!memory) return refused(memory.error());
   const auto forest = RemoteForest::open(memory->at.get(), memory->size);
   if (!forest) return refused(forest.error());
-  edges_.attach(owner, *forest, std::move(memory->at));
+  edges_.attach(owner, *forest, memory->at);
+  kept_.attach(owner, *forest, memory->at);
+  {
+    const Lock lock(mutex_);
+    memories_[owner] = {incarnation, std::make_shared<const RemoteForest>(*forest),
+                        *std::move(memory)};
+  }
   note(owner, Known{Known::State::kAttached, incarnation, {}, Clock::now()});
   if (over->load()) end(owner, incarnation, false);
   // The owner may have been lost meanwhile.
   look_again();
+  watchers_.attached();
 }
 
 void MemoryReads::note(Owner owner, std::optional<Known> known) {
@@ -185,7 +215,92 @@ void MemoryReads::look_again() {
     }
     other_clocks_.store(other_clocks, std::memory_order_relaxed);
     for (const Owner owner : gone) edges_.detach(owner);
+    drop_kept();
   }
+}
+
+void MemoryReads::drop_kept() {
+  std::vector<Owner> gone;
+  for (auto one = memories_.begin(); one != memories_.end();) {
+    const Owner owner = one->first;
+    const auto serving = structure_.directory.serving(structure_.directory.name(owner));
+    if (serving && serving->incarnation != one->second.incarnation) {
+      kept_.detach(owner);
+      one = memories_.erase(one);
+      continue;
+    }
+    const auto known = owners_.find(owner);
+    const bool there = known != owners_.end() && known->second.state == Known::State::kAttached;
+    std::optional<Clock::time_point>& lost = one->second.lost;
+    if (there) {
+      lost.reset();
+    } else {
+      lost = lost.value_or(Clock::now());
+      gone.push_back(owner);
+    }
+    ++one;
+  }
+  std::sort(gone.begin(), gone.end(), [&](Owner x, Owner y) TFDUDE_UNCHECKED_LOCKS {
+    return memories_[x].lost < memories_[y].lost;
+  });
+  for (std::size_t i = 0; i + kMostGone < gone.size(); ++i) {
+    kept_.detach(gone[i]);
+    memories_.erase(gone[i]);
+  }
+}
+
+bool MemoryReads::can_watch(const std::vector<Part>& parts) {
+  if (!reads_ || parts.empty() || !can_wait_for_numbers()) return false;
+  bool all = true;
+  {
+    const Lock lock(mutex_);
+    for (const Part& part : parts) {
+      const auto known = owners_.find(part.owner);
+      const bool attached =
+          known != owners_.end() && known->second.state == Known::State::kAttached;
+      all = all && (part.owner == kHeldHere || attached);
+    }
+    // Those beyond could not be waited for.
+    if (memories_.size() > MemoryWaits::kMostOwners) all = false;
+  }
+  if (!all) asked(parts);
+  return all;
+}
+
+std::optional<Reply> MemoryReads::read(const Request& request) {
+  const auto* asked = std::get_if<LookupRequest>(&request.body);
+  // Of an observation, and of a velocity, more is needed than what is read.
+  if (asked == nullptr || asked->edges || asked->timed || !any()) return std::nullopt;
+  const bool of_age = asked->query.age_noise_until.has_value();
+  if (of_age && other_clocks_.load(std::memory_order_relaxed)) return std::nullopt;
+  const Forest& forest = structure_.forest;
+  const auto look = [&] {
+    return forest.lookup_segments(asked->segments, asked->query, asked->hint, edges_);
+  };
+  auto found = look();
+  if (!found && found.error().code == Errc::kNotOwner) {
+    const auto bound = [&](const PathEnds& one) {
+      return forest.bind(one.from, one.to, edges_) > 0;
+    };
+    const bool all = std::all_of(asked->segments.begin(), asked->segments.end(), bound);
+    if (all) found = look();
+  }
+  if (!found) return std::nullopt;
+  return Reply{request.sequence, 0, *std::move(found)};
+}
+
+void MemoryReads::wait_for(const std::set<Owner>& owners) {
+  MemoryWaits::Owners waited;
+  {
+    const Lock lock(mutex_);
+    for (const Owner owner : owners) {
+      const auto found = memories_.find(owner);
+      if (found != memories_.end()) {
+        waited[owner] = {found->second.forest, found->second.memory};
+      }
+    }
+  }
+  waits_.wait_for(std::move(waited));
 }
 
 void MemoryReads::end(Owner owner, std::uint64_t incarnation, bool died) {
@@ -236,7 +351,8 @@ Reply MemoryReads::answer(const Request& request, std::uint64_t incarnation) {
     if (memory_.arena == nullptr || memory_.port == nullptr) {
       offer_ = nowhere;
     } else {
-      auto offered = memory_.port->offer(layout_hash());
+      auto offered =
+          memory_.port->offer(layout_hash(), [this](bool waited) { set_waited(waited); });
       if (!offered) nowhere.why_not = offered.error().message;
       offer_ = offered ? *std::move(offered) : nowhere;
     }
@@ -244,6 +360,13 @@ Reply MemoryReads::answer(const Request& request, std::uint64_t incarnation) {
   Reply reply{request.sequence, 0, *offer_};
   std::get<MemoryOffer>(reply.body).incarnation = incarnation;
   return reply;
+}
+
+void MemoryReads::set_waited(bool waited) {
+  if (!waited) return structure_.forest.on_commit(nullptr, this);
+  structure_.forest.on_commit([this] { wake_job_.ask(); }, this);
+  // Of what was committed before.
+  wake_job_.ask();
 }
 
 }  // namespace tfdude

@@ -3,8 +3,11 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
+#include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +20,7 @@
 #include "partition/routing.hpp"
 #include "runtime/context.hpp"
 #include "runtime/member_runner.hpp"
+#include "runtime/memory_waits.hpp"
 #include "runtime/process_memory.hpp"
 #include "tree/forest.hpp"
 #include "tree/remote_edges.hpp"
@@ -32,7 +36,15 @@ namespace tfdude {
 ///   a path that is new or has changed.
 class MemoryReads {
  public:
-  MemoryReads(const Context& context, ProcessMemory& memory);
+  /// What is told to those who watch paths by it, from threads in the background.
+  struct Watchers {
+    /// The memory of an owner can be read from now on.
+    std::function<void()> attached;
+    /// Owners have committed something. @return when to call again, unless they have before
+    std::function<Loop::Clock::time_point()> committed;
+  };
+
+  MemoryReads(const Context& context, ProcessMemory& memory, Watchers watchers);
   ~MemoryReads() { stop(); }
   MemoryReads(const MemoryReads&) = delete;
   MemoryReads& operator=(const MemoryReads&) = delete;
@@ -45,11 +57,11 @@ class MemoryReads {
   /// X_AB, if all edges are own or can be read; otherwise an error that says nothing.
   template <class Name>
   [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
-    return read(a, b, [&] { return structure_.forest.lookup(a, b, edges_); });
+    return read(a, b, edges_, [&] { return structure_.forest.lookup(a, b, edges_); });
   }
   template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
-    return read(a, b, [&] { return structure_.forest.lookup_pose(a, b, edges_); });
+    return read(a, b, edges_, [&] { return structure_.forest.lookup_pose(a, b, edges_); });
   }
   template <class Name>
   [[nodiscard]] Result<StampedTransform> lookup(Name a, Name b, const Query& query) {
@@ -57,10 +69,45 @@ class MemoryReads {
     if (query.age_noise_until && other_clocks_.load(std::memory_order_relaxed)) {
       return fail(Errc::kUnsupported, {});
     }
-    return read(a, b, [&] { return structure_.forest.lookup(a, b, query, edges_); });
+    // Over DDS each owner adds up its edges first, which makes a difference for these. So does who
+    // reads their segments in memory; see read(Request).
+    if (query.order == Order::kFourth) return fail(Errc::kUnsupported, {});
+    auto X_AB = read(a, b, edges_, [&] { return structure_.forest.lookup(a, b, query, edges_); });
+    if (X_AB && X_AB->basis.bound) X_AB = fail(Errc::kUnsupported, {});
+    return X_AB;
   }
+  /// The reply of an owner to a request for segments, if it can be read.
+  [[nodiscard]] std::optional<Reply> read(const Request& request);
   /// Whether there is anything to read.
   [[nodiscard]] bool any() const { return edges_.any() && !member_.out(); }
+
+  // --- watched paths
+
+  /// Whether a path of these parts can be watched in memory. Otherwise it is found out where that
+  /// is.
+  [[nodiscard]] bool can_watch(const std::vector<Part>& parts);
+  /// As lookup(); of owners that are gone, the last values.
+  [[nodiscard]] Result<StampedTransform> lookup_kept(const std::string& a, const std::string& b,
+                                                     const Query& query) {
+    return read(a, b, kept_, [&] { return structure_.forest.lookup(a, b, query, kept_); });
+  }
+  /// As Forest::explain().
+  [[nodiscard]] Error explained(Error error, const std::string& a, const std::string& b,
+                                const Query& query) const {
+    return structure_.forest.explain(std::move(error), a, b, query, kept_);
+  }
+  /// As Forest::written().
+  [[nodiscard]] std::optional<std::uint64_t> written(const std::string& a, const std::string& b) {
+    auto number = structure_.forest.written(a, b, kept_);
+    if (!number && structure_.forest.bind(a, b, kept_) > 0) {
+      number = structure_.forest.written(a, b, kept_);
+    }
+    return number;
+  }
+  /// Waits for commits of these owners, and no others.
+  void wait_for(const std::set<Owner>& owners);
+
+  // --- owners
 
   /// Owners were asked over DDS for parts of a lookup.
   void asked(const std::vector<Part>& parts);
@@ -87,11 +134,20 @@ class MemoryReads {
     Clock::time_point since = Clock::now();
   };
 
+  // An owner whose memory was attached, and the last commit of which is still read by `kept_`.
+  struct Kept {
+    std::uint64_t incarnation = 0;
+    std::shared_ptr<const RemoteForest> forest;
+    MappedMemory memory;
+    std::optional<Clock::time_point> lost{};  // since when it is gone
+  };
+
   template <class Name, class Look>
-  [[nodiscard]] auto read(Name a, Name b, Look look) -> decltype(look()) {
+  [[nodiscard]] auto read(const Name& a, const Name& b, RemoteEdges& edges, Look look)
+      -> decltype(look()) {
     auto X_AB = look();
     const bool unbound = !X_AB && X_AB.error().code == Errc::kNotOwner;
-    if (unbound && structure_.forest.bind(a, b, edges_) > 0) X_AB = look();
+    if (unbound && structure_.forest.bind(a, b, edges) > 0) X_AB = look();
     return X_AB;
   }
 
@@ -102,6 +158,10 @@ class MemoryReads {
   void renew();
   void note(Owner owner, std::optional<Known> known);
   void end(Owner owner, std::uint64_t incarnation, bool died);
+  /// Forgets the last values of owners that have returned as another process, or have been gone
+  /// for longer than most others.
+  void drop_kept() TFDUDE_REQUIRES(mutex_) TFDUDE_REQUIRES(structure_.mutex);
+  void set_waited(bool waited);
 
   Structure& structure_;
   MemberRunner& member_;
@@ -109,14 +169,20 @@ class MemoryReads {
   ProcessMemory& memory_;
   const bool reads_;
   const Milliseconds timeout_;
-  RemoteEdges edges_;
+  RemoteEdges edges_;  // of owners that are there
+  RemoteEdges kept_;   // of those, and of some that are gone
   std::atomic<bool> other_clocks_{false};
   mutable Mutex mutex_{LockRank::kParts};
   std::map<Owner, Known> owners_ TFDUDE_GUARDED_BY(mutex_);
+  std::map<Owner, Kept> memories_ TFDUDE_GUARDED_BY(mutex_);
   Mutex offer_mutex_{LockRank::kParts};
   std::optional<MemoryOffer> offer_ TFDUDE_GUARDED_BY(offer_mutex_);
   Mutex attaching_{LockRank::kSending};  // one owner after the other
-  Loop::Job job_;                        // last: it uses the other members
+  // Last: they use the other members.
+  const Watchers watchers_;
+  Loop::Job job_;
+  Loop::Job wake_job_;  // wakes those who wait for own commits
+  MemoryWaits waits_;
 };
 
 }  // namespace tfdude

@@ -24,14 +24,15 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       discovery_(structure_, *transport_, options.discovery, options.timeout),
       member_(context_, std::move(partition), *this),
       requests_(structure_, discovery_, *transport_, *this, follow()),
-      memory_(context_, process_memory_),
+      memory_(context_, process_memory_,
+              {[this] { watches_.look_again(); }, [this] { return look_in_memory(); }}),
       yielding_(context_),
       serving_(context_),
       queries_(context_),
       writes_(context_),
       joints_(context_),
       observations_(context_),
-      watches_(context_),
+      watches_(context_, &memory_),
       watch_server_(context_, watches_),
       lookups_(context_, watches_, &memory_),
       velocities_(context_, lookups_),
@@ -54,6 +55,12 @@ void Participant::on_routes() {
 std::optional<Requests::Follow> Participant::follow() {
   if (!options_.follow) return std::nullopt;
   return Requests::Follow{*options_.follow, [this] { on_routes(); }};
+}
+
+Loop::Clock::time_point Participant::look_in_memory() {
+  const Watched::Looked looked = watches_.look();
+  if (looked.is_new) lookups_.pushed();
+  return looked.again;
 }
 
 // A stream learns of new owners by pages only.

@@ -125,6 +125,9 @@ class Participant final : public TransportHandler,
 
   // OwnPartition
   [[nodiscard]] Reply answer_own(const Request& request) override;
+  [[nodiscard]] std::optional<Reply> read(const Request& request) override {
+    return memory_.read(request);
+  }
   void announce_changes(const Deadline& deadline) override { member_.tell(deadline); }
   [[nodiscard]] Result<void> await_stored(const Request& request,
                                           const Deadline& deadline) override {
@@ -135,6 +138,8 @@ class Participant final : public TransportHandler,
   }
 
   [[nodiscard]] std::optional<Requests::Follow> follow();
+  /// Others have committed something. @return when to call again
+  [[nodiscard]] Loop::Clock::time_point look_in_memory();
   [[nodiscard]] Reply answer_frames(const Request& request);
   /// The reply to a request that changes nothing; empty for other requests.
   [[nodiscard]] std::optional<Reply> answer_query(const Request& request,

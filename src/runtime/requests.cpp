@@ -42,6 +42,14 @@ Error Requests::last_word(Error error, const TimeLimit& limit) {
   return may_appear(error.code) ? discovery_.explained(std::move(error)) : error;
 }
 
+Result<void> Requests::send(const std::string& partition, const Request& request,
+                            Clock::time_point until) {
+  const auto read = own_.read(request);
+  if (!read) return transport_.send(partition, request, until);
+  replies_.on_reply(partition, *read);
+  return {};
+}
+
 Result<void> Requests::run(Task& task, const Deadline& deadline) {
   Call call(replies_, task, deadline, on_demand_ != nullptr);
   while (call.state() != Call::State::kOver) go_on(call, task, deadline);

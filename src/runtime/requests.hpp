@@ -23,6 +23,10 @@ class OwnPartition {
   virtual ~OwnPartition() = default;
 
   [[nodiscard]] virtual Reply answer_own(const Request& request) = 0;
+  /// What another owner would reply, if it can be read in the memory of that owner.
+  [[nodiscard]] virtual std::optional<Reply> read(const Request& /*request*/) {
+    return std::nullopt;
+  }
   /// Announces changes made here to others, which are asked to build on them.
   virtual void announce_changes(const Deadline& deadline) = 0;
   /// Waits until the changes of a request are stored here, if required.
@@ -56,9 +60,7 @@ class Requests final : public RequestLink {
 
   // RequestLink
   [[nodiscard]] Result<void> send(const std::string& partition, const Request& request,
-                                  Clock::time_point until) override {
-    return transport_.send(partition, request, until);
-  }
+                                  Clock::time_point until) override;
   [[nodiscard]] Reply answer(const Request& request) override { return own_.answer_own(request); }
 
   /// Null: all frames are kept here.

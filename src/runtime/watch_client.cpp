@@ -8,6 +8,7 @@
 #include "tfdude/base/number.hpp"
 
 #include "runtime/member_runner.hpp"
+#include "runtime/memory_reads.hpp"
 #include "runtime/requests.hpp"
 
 namespace tfdude {
@@ -23,11 +24,20 @@ Result<void> check_rate(double rate) {
 
 }  // namespace
 
-WatchClient::WatchClient(const Context& context)
+WatchClient::WatchClient(const Context& context, MemoryReads* memory)
     : context_(context),
       routes_(context.threads.callbacks.line()),
+      memory_(memory),
       rounds_(context.requests.replies(), context.options.timeout),
+      look_job_(context.threads.push, [this] { return look().again; }),
       job_(context.threads.asking, [this] { return round(); }) {}
+
+void WatchClient::stop() {
+  job_.stop();
+  context_.structure.forest.on_commit(nullptr, this);
+  look_job_.stop();
+  rounds_.end();
+}
 
 Result<std::shared_ptr<WatchedPath>> WatchClient::watch(const std::string& a, const std::string& b,
                                                         const WatchOptions& options) {
@@ -37,7 +47,7 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch(const std::string& a, co
     return context_.structure.forest.segments(a, b);
   });
   if (!known) return tl::unexpected(std::move(known.error()));
-  return follow(std::make_shared<WatchedPath>(a, b, options, routes_), deadline);
+  return follow(std::make_shared<WatchedPath>(a, b, options, routes_, memory_), deadline);
 }
 
 Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
@@ -117,7 +127,18 @@ Loop::Clock::time_point WatchClient::round() {
   while (PendingRequests* asked = rounds_.step(Loop::Clock::now(), *this)) {
     context_.requests.await(*asked, Deadline(context_.options.timeout));
   }
+  wait_for_commits();
   return rounds_.next();
+}
+
+void WatchClient::wait_for_commits() {
+  if (memory_ == nullptr) return;
+  std::set<Owner> owners = rounds_.owners_in_memory();
+  const bool own = owners.erase(kHeldHere) > 0;
+  memory_->wait_for(owners);
+  std::function<void()> listener;
+  if (own) listener = [this] { look_job_.ask(); };
+  context_.structure.forest.on_commit(std::move(listener), this);
 }
 
 Result<void> WatchClient::plan(Watched& watched) {

@@ -18,17 +18,18 @@ namespace tfdude {
 /// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
 class WatchClient final : private WatchLink {
  public:
-  explicit WatchClient(const Context& context);
+  /// @param memory  of others, for paths of owners on this computer; null: all push
+  explicit WatchClient(const Context& context, MemoryReads* memory = nullptr);
   ~WatchClient() override { stop(); }
   WatchClient(const WatchClient&) = delete;
   WatchClient& operator=(const WatchClient&) = delete;
 
   /// After it has returned nothing new comes. Call from one thread; nothing may be watched
   /// afterwards.
-  void stop() {
-    job_.stop();
-    rounds_.end();
-  }
+  void stop();
+
+  /// Looks at the memory that paths are read from: something may have been committed there.
+  Watched::Looked look() const { return rounds_.look(Loop::Clock::now()); }
 
   /// @return as Client::watch()
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> watch(const std::string& a,
@@ -67,6 +68,8 @@ class WatchClient final : private WatchLink {
 
   void add(std::shared_ptr<Watched> watched);
   [[nodiscard]] Loop::Clock::time_point round();
+  /// Lets the owners, and this process, wake the paths that are read from their memory.
+  void wait_for_commits();
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
                                                             const Deadline& deadline);
   /// kTimeout, naming the owners.
@@ -74,9 +77,12 @@ class WatchClient final : private WatchLink {
 
   const Context context_;
   const std::shared_ptr<Callbacks::Line> routes_;
+  MemoryReads* const memory_;
   std::atomic<bool> watches_paths_{false};  // or has watched one before
   WatchRounds rounds_;
-  Loop::Job job_;  // last: it uses the other members
+  // Last: they use the other members.
+  Loop::Job look_job_;  // after own commits
+  Loop::Job job_;
 };
 
 }  // namespace tfdude

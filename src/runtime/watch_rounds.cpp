@@ -60,6 +60,22 @@ bool WatchRounds::can_answer(const std::string& a, const std::string& b, const Q
   });
 }
 
+Watched::Looked WatchRounds::look(Clock::time_point now) const {
+  Watched::Looked all;
+  for (const auto& entry : entries()) {
+    const Watched::Looked one = entry->watched->look(now);
+    all.is_new = all.is_new || one.is_new;
+    all.again = std::min(all.again, one.again);
+  }
+  return all;
+}
+
+std::set<Owner> WatchRounds::owners_in_memory() const {
+  std::set<Owner> owners;
+  for (const auto& entry : entries()) owners.merge(entry->watched->owners_in_memory());
+  return owners;
+}
+
 WatchRounds::Entries WatchRounds::drop_unused() {
   Entries unused;  // destroyed without the lock, with their callbacks
   const Lock lock(mutex_);

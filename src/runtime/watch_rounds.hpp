@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,6 +55,11 @@ class WatchRounds {
   /// Whether pushed values suffice for this lookup.
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const;
+
+  /// Lets all look at the memory that they are read from.
+  Watched::Looked look(Clock::time_point now) const;
+  /// The owners of that memory.
+  [[nodiscard]] std::set<Owner> owners_in_memory() const;
 
   /// What a plan would find has changed. @return whether a round must follow
   [[nodiscard]] bool look_again();

@@ -41,8 +41,8 @@ class Watched {
     Part part;  ///< a WatchRequest
   };
   struct Plan {
-    std::vector<Group> groups;
-    bool is_new = false;  ///< it differs from the one before
+    std::vector<Group> groups;  ///< none: nothing is pushed
+    bool is_new = false;        ///< it differs from the one before
   };
 
   virtual ~Watched() = default;
@@ -56,6 +56,15 @@ class Watched {
                                         const Query& /*query*/) const {
     return false;
   }
+
+  /// Tells what has been written to memory that it is read from. Without a lock of the caller.
+  struct Looked {
+    bool is_new = false;
+    Clock::time_point again = Clock::time_point::max();  ///< when to look again
+  };
+  virtual Looked look(Clock::time_point /*now*/) { return {}; }
+  /// The owners whose memory it is read from.
+  [[nodiscard]] virtual std::set<Owner> owners_in_memory() const { return {}; }
 
   // --- rounds ---
 

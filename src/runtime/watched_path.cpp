@@ -1,11 +1,13 @@
 #include "runtime/watched_path.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <vector>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/mutex.hpp"
+#include "runtime/memory_reads.hpp"
 #include "tree/epoch.hpp"
 
 namespace tfdude {
@@ -34,11 +36,12 @@ bool wants_newest(const Query& query) {
 }  // namespace
 
 WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options,
-                         std::shared_ptr<Callbacks::Line> routes)
+                         std::shared_ptr<Callbacks::Line> routes, MemoryReads* memory)
     : a_(std::move(a)),
       b_(std::move(b)),
       options_(std::move(options)),
       routes_(std::move(routes)),
+      others_(memory),
       why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
 
 WatchedPath::WatchedPath(std::vector<std::string> frames, WatchOptions options,
@@ -46,6 +49,7 @@ WatchedPath::WatchedPath(std::vector<std::string> frames, WatchOptions options,
     : frames_(std::move(frames)),
       options_(std::move(options)),
       routes_(std::move(routes)),
+      others_(nullptr),
       why_not_{Errc::kNotYet, "the " + described() + " is being asked for"} {}
 
 WatchedPath::~WatchedPath() = default;
@@ -54,6 +58,9 @@ Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
   {
     const epoch::Guard guard;
     // seq_cst: after the guard's announcement, see epoch.hpp.
+    if (MemoryReads* memory = memory_.load(std::memory_order_seq_cst)) {
+      return lookup_in(*memory, query);
+    }
     const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
     if (mirror != nullptr) {
       auto found = mirror->lookup(query);
@@ -89,6 +96,9 @@ std::string WatchedPath::described() const {
 
 bool WatchedPath::has_data(const Query& query) const {
   const epoch::Guard guard;
+  if (MemoryReads* memory = memory_.load(std::memory_order_seq_cst)) {
+    return memory->lookup_kept(a_, b_, query).has_value();
+  }
   const WatchMirror* mirror = shown_.load(std::memory_order_seq_cst);
   return mirror != nullptr && mirror->lookup(query).has_value();
 }
@@ -100,7 +110,7 @@ std::vector<Time> WatchedPath::stamps(std::string_view id, Time after) const {
 
 Result<void> WatchedPath::health() const {
   const Lock lock(mutex_);
-  if (followed_ == nullptr) return tl::unexpected(why_not_);
+  if (!live()) return tl::unexpected(why_not_);
   return health_;
 }
 
@@ -166,8 +176,9 @@ bool WatchedPath::take(const PushedValues& pushed, Clock::time_point now) {
   return lacks;
 }
 
-void WatchedPath::remember_newest() {
-  auto newest = followed_->lookup({});
+void WatchedPath::remember_newest() { remember(followed_->lookup({})); }
+
+void WatchedPath::remember(Result<StampedTransform> newest) {
   if (newest) {
     newest_ = *std::move(newest);
     hold(nullptr);
@@ -175,7 +186,7 @@ void WatchedPath::remember_newest() {
     // A history was cleared: what was before does not hold any more.
     newest_.reset();
     hold(nullptr);
-  } else if (lacks_common(newest) && newest_ && holder_ == nullptr) {
+  } else if ((lacks_common(newest) || in_memory()) && newest_ && holder_ == nullptr) {
     hold(std::make_unique<const StampedTransform>(*newest_));
   }
 }
@@ -192,11 +203,15 @@ bool WatchedPath::swap_if_ready(Clock::time_point now) {
   if (next_ == nullptr || !next_->complete()) return false;
   if (followed_ != nullptr) {
     if (next_->is_behind(*followed_)) return false;
-    if (lacks_common(next_->lookup({})) && now - next_since_ < kWaitForCommon) return false;
   }
+  const bool may_wait = live() && now - next_since_ < kWaitForCommon;
+  if (may_wait && lacks_common(next_->lookup({}))) return false;
+  const bool same = route_in_memory_ && route_in_memory_->is_same(next_->route());
   show(std::move(next_));
+  memory_.store(nullptr, std::memory_order_seq_cst);
+  route_in_memory_.reset();
   remember_newest();
-  return std::exchange(was_shown_, true);
+  return std::exchange(was_shown_, true) && !same;
 }
 
 void WatchedPath::show(std::unique_ptr<WatchMirror> mirror) {
@@ -218,6 +233,8 @@ void WatchedPath::interrupt(Error why) {
     const Lock lock(mutex_);
     why_not_ = std::move(why);
     next_.reset();
+    memory_.store(nullptr, std::memory_order_seq_cst);
+    route_in_memory_.reset();
     show(nullptr);
     newest_.reset();
     hold(nullptr);
@@ -227,6 +244,7 @@ void WatchedPath::interrupt(Error why) {
 
 bool WatchedPath::up_to_date() const {
   const Lock lock(mutex_);
+  if (next_ == nullptr && in_memory()) return true;
   if (next_ != nullptr || followed_ == nullptr || followed_->lacks()) return false;
   if (skipped_from()) return false;
   return asked_for_history_ >= kMostAskedForHistory || !followed_->lacks_history();
@@ -287,12 +305,20 @@ Result<void> WatchedPath::plan(const KnownStructure& known) {
   auto route = this->route(known);
   if (!route) return tl::unexpected(std::move(route.error()));
   planned_ = *std::move(route);
+  // Of an edges' watch, other frames than those of the edges are unknown; composed segments cannot
+  // be told apart, wherever they are.
+  planned_in_memory_ = others_ != nullptr && frames_.empty() && !options_.composed &&
+                       others_->can_watch(planned_.parts);
   return {};
 }
 
 Watched::Plan WatchedPath::adopt(Clock::time_point now) {
   collect();
   planned();
+  if (planned_in_memory_) {
+    if (read_memory(now)) report_rerouted();
+    return {};
+  }
   Plan plan{{}, !follows(planned_)};
   for (std::size_t i = 0; i < planned_.parts.size(); ++i) {
     plan.groups.push_back({planned_.sources[i].group, planned_.parts[i]});
@@ -330,6 +356,10 @@ bool WatchedPath::on_denied(const Part& part, const Error* why) {
 
 void WatchedPath::end() {
   interrupt({Errc::kTransport, "the client of this watched path has ended"});
+  if (others_ == nullptr) return;
+  // Lookups that have begun before.
+  const std::uint64_t tag = epoch::retire_tag();
+  while (epoch::safe_below() <= tag) std::this_thread::yield();
 }
 
 void WatchedPath::report(std::string what) {
@@ -343,6 +373,7 @@ void WatchedPath::report_rerouted() {
   {
     const Lock lock(mutex_);
     if (followed_ != nullptr) edges = followed_->route().edges.size();
+    if (route_in_memory_) edges = route_in_memory_->edges.size();
   }
   report("the " + described() + " has a new route, over " + std::to_string(edges) + " edges");
 }
@@ -425,9 +456,9 @@ bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadli
 Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
   Lock lock(mutex_);
   changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) {
-    return followed_ != nullptr && !followed_->lacks_history();
+    return in_memory() || (followed_ != nullptr && !followed_->lacks_history());
   });
-  if (followed_ != nullptr) return {};
+  if (live()) return {};
   return tl::unexpected(why_not_);
 }
 

@@ -22,7 +22,10 @@
 
 namespace tfdude {
 
-/// One watched path, or several edges that are watched together. It shows the mirror of one route,
+class MemoryReads;
+
+/// One watched path, or several edges that are watched together. If the memory of all owners of the
+/// path can be read, it is read there. Otherwise it shows the mirror of one route,
 /// which readers find by one load. If the path takes another route, that has its own mirror, which
 /// is shown once it has all values; readers of the previous one keep it until they are done
 /// (epoch.hpp). While the shown mirror has no instant
@@ -33,8 +36,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   using ValueCallback = std::function<void(const Result<StampedTransform>&)>;
 
   /// @param routes  calls WatchOptions::on_route; null: nothing is called, on_value() neither
+  /// @param memory  of others, as long as end() was not called; null: all push
   WatchedPath(std::string a, std::string b, WatchOptions options,
-              std::shared_ptr<Callbacks::Line> routes = nullptr);
+              std::shared_ptr<Callbacks::Line> routes = nullptr, MemoryReads* memory = nullptr);
   /// The edges of these frames. lookup(Query) then has no result, and there is no common instant to
   /// wait for.
   WatchedPath(std::vector<std::string> frames, WatchOptions options,
@@ -77,7 +81,10 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] Result<WatchRoute> route(const KnownStructure& known) const;
 
   bool take(const PushedValues& pushed, Clock::time_point now) override;
+  /// After it has returned, no memory of others is read.
   void end() override;
+  Looked look(Clock::time_point now) override;
+  [[nodiscard]] std::set<Owner> owners_in_memory() const override;
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
                                 const Query& query) const override {
     return a_ == a && b_ == b && has_data(query);
@@ -112,7 +119,16 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
     std::shared_ptr<const void> object;
   };
 
-  [[nodiscard]] bool live() const { return shown_.load(std::memory_order_acquire) != nullptr; }
+  [[nodiscard]] bool live() const {
+    return shown_.load(std::memory_order_acquire) != nullptr || in_memory();
+  }
+  [[nodiscard]] bool in_memory() const {
+    return memory_.load(std::memory_order_acquire) != nullptr;
+  }
+  /// What is found in the memory of the owners, or was there last.
+  [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;
+  /// From now on the planned route is read in memory. @return whether another one was shown before
+  bool read_memory(Clock::time_point now);
   /// Whether the path uses this route, or is about to.
   [[nodiscard]] bool follows(const WatchRoute& route) const;
   /// Prepares another route. @return whether it is shown already, as it needs no values
@@ -142,11 +158,13 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   void report(std::string what);
   void report_rerouted();
   [[nodiscard]] bool swap_if_ready(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  /// Null: nothing, unless it is read in memory.
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);
   /// Tells all who wait that something is new.
   void tell();
   /// Call after any change of the shown values.
   void remember_newest() TFDUDE_REQUIRES(mutex_);
+  void remember(Result<StampedTransform> newest) TFDUDE_REQUIRES(mutex_);
   void hold(std::unique_ptr<const StampedTransform> X) TFDUDE_REQUIRES(mutex_);
 
   const std::string a_;
@@ -158,7 +176,10 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
   const std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
+  MemoryReads* const others_;                    // null: all push
+  std::atomic<MemoryReads*> memory_{nullptr};    // instead of a mirror
   WatchRoute planned_;                           // until it is adopted; belongs to the rounds
+  bool planned_in_memory_ = false;               // likewise
   mutable Condition changed_;                    // of messages_, shown_
   mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
@@ -170,6 +191,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   int asked_for_history_ TFDUDE_GUARDED_BY(mutex_) = 0;
   bool was_shown_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::vector<Retired> retired_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<WatchRoute> route_in_memory_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<std::uint64_t> written_ TFDUDE_GUARDED_BY(mutex_);  // see MemoryReads::written()
+  Clock::time_point tell_from_ TFDUDE_GUARDED_BY(mutex_) = Clock::time_point::min();
   std::optional<Clock::time_point> not_connected_since_ TFDUDE_GUARDED_BY(mutex_);
   Error why_not_ TFDUDE_GUARDED_BY(mutex_);
   Result<void> health_ TFDUDE_GUARDED_BY(mutex_);

@@ -261,6 +261,17 @@ class Forest {
                                                 const RemoteEdges& others) const;
   [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query,
                                                 const RemoteEdges& others) const;
+  /// As lookup_segments(), likewise. Without a period.
+  [[nodiscard]] Result<SegmentValues> lookup_segments(const std::vector<PathEnds>& segments,
+                                                      const Query& query, std::optional<Time> hint,
+                                                      const RemoteEdges& others) const;
+  /// A number that differs from an earlier one if anything of the edges of the path was written
+  /// since, or if it has other edges. Empty: an edge is not bound, or cannot be read.
+  [[nodiscard]] std::optional<std::uint64_t> written(std::string_view a, std::string_view b,
+                                                     const RemoteEdges& others) const;
+  /// An error of such a lookup, with the text that lookups of own edges have.
+  [[nodiscard]] Error explain(Error error, std::string_view a, std::string_view b,
+                              const Query& query, const RemoteEdges& others) const;
   /// Binds the edges of others on the path to the memory of those that are attached.
   /// @return how many of them are bound now, if all are; otherwise 0
   std::size_t bind(std::string_view a, std::string_view b, RemoteEdges& others) const;

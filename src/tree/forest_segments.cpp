@@ -4,10 +4,14 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/finite.hpp"
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
 #include "tree/held_edges.hpp"
 #include "tree/no_data.hpp"
+#include "tree/path_walk.hpp"
+#include "tree/read_intact.hpp"
+#include "tree/remote_edges.hpp"
 #include "tree/unspecified_edges.hpp"
 
 // Lookups of segments that another participant asks for.
@@ -59,15 +63,45 @@ struct Reached {
   [[nodiscard]] Output output() { return {X, correlation}; }
 };
 
-Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments,
+// As of PathLookup, and over edges that others hold.
+struct Own {
+  static Result<void> reach_newest(const Ends& ends, Order order, PathLookup::Met& met,
+                                   Output output) {
+    return PathLookup::reach_newest(ends, PathLookup::Absent::kMayPass, order, met, output);
+  }
+  static Result<void> reach_at(const Ends& ends, const PathLookup::Instant& at, const Query& query,
+                               PathLookup::Met& met, Output output) {
+    return PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, at, query, met, output);
+  }
+  static std::vector<std::string> unspecified(const Ends& ends, std::int64_t t) {
+    return unspecified_edges(ends, t);
+  }
+};
+struct Others {
+  RemoteReading& reading;
+
+  Result<void> reach_newest(const Ends& ends, Order order, PathLookup::Met& met,
+                            Output output) const {
+    return tfdude::reach_newest(ends, PathLookup::Absent::kMayPass, order, reading, met, output);
+  }
+  Result<void> reach_at(const Ends& ends, const PathLookup::Instant& at, const Query& query,
+                        PathLookup::Met& met, Output output) const {
+    return tfdude::reach_at(ends, PathLookup::Absent::kMayPass, at, query, reading, met, output);
+  }
+  std::vector<std::string> unspecified(const Ends& ends, std::int64_t t) const {
+    return unspecified_edges(ends, t, reading);
+  }
+};
+
+template <class From>
+Result<std::vector<Reached>> values_at(const From& from, const std::vector<Ends>& segments,
                                        const PathLookup::Instant& at, const Query& query,
                                        PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   for (const Ends& ends : segments) {
     PathLookup::Met of_this;
-    auto ok = PathLookup::reach_at(ends, PathLookup::Absent::kMayPass, at, query, of_this,
-                                   values.emplace_back().output());
+    auto ok = from.reach_at(ends, at, query, of_this, values.emplace_back().output());
     if (!ok) return tl::unexpected(std::move(ok.error()));
     met.moving = met.moving || of_this.moving;
   }
@@ -76,15 +110,15 @@ Result<std::vector<Reached>> values_at(const std::vector<Ends>& segments,
 
 // The newest value of each segment. If several have dynamic edges, the common instant is that of
 // the oldest.
-Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Order order,
-                                           PathLookup::Met& met) {
+template <class From>
+Result<std::vector<Reached>> newest_values(const From& from, const std::vector<Ends>& segments,
+                                           Order order, PathLookup::Met& met) {
   std::vector<Reached> values;
   values.reserve(segments.size());
   bool mixed = false;
   for (const Ends& ends : segments) {
     PathLookup::Met of_this;
-    auto ok = PathLookup::reach_newest(ends, PathLookup::Absent::kMayPass, order, of_this,
-                                       values.emplace_back().output());
+    auto ok = from.reach_newest(ends, order, of_this, values.emplace_back().output());
     if (!ok) return tl::unexpected(std::move(ok.error()));
     const HeldVersion* limiting = of_this.limiting;
     if (limiting == nullptr) continue;
@@ -95,7 +129,7 @@ Result<std::vector<Reached>> newest_values(const std::vector<Ends>& segments, Or
   if (!mixed) return values;
   Query query;
   query.order = order;
-  return values_at(segments, {met.limiting->stamp, true}, query, met);
+  return values_at(from, segments, {met.limiting->stamp, true}, query, met);
 }
 
 // The newest history among the edges of these segments.
@@ -181,19 +215,20 @@ std::vector<std::int64_t> changed_instants(const std::vector<Ends>& segments,
 
 // What was reached on the segments, at an instant. Correlations are reported if any segment has
 // some.
-SegmentValues values_of(const std::vector<Ends>& segments, std::vector<Reached>&& from,
-                        std::int64_t t) {
+template <class From>
+SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
+                        std::vector<Reached>&& reached, std::int64_t t) {
   SegmentValues found;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    found.values.push_back(from[i].X);
-    if (from[i].X.covariance.complete()) continue;
-    for (std::string& id : unspecified_edges(segments[i], t)) {
+  for (std::size_t i = 0; i < reached.size(); ++i) {
+    found.values.push_back(reached[i].X);
+    if (reached[i].X.covariance.complete()) continue;
+    for (std::string& id : from.unspecified(segments[i], t)) {
       found.unspecified.push_back({i, std::move(id)});
     }
   }
   const auto none = [](const auto& one) { return one.correlation.empty(); };
-  if (std::all_of(from.begin(), from.end(), none)) return found;
-  for (auto& one : from) found.correlations.push_back(std::move(one.correlation));
+  if (std::all_of(reached.begin(), reached.end(), none)) return found;
+  for (auto& one : reached) found.correlations.push_back(std::move(one.correlation));
   return found;
 }
 
@@ -231,25 +266,30 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
   }
 }
 
-Result<SegmentValues> segments_at(const std::vector<Ends>& segments, const PathLookup::Instant& at,
-                                  const Query& query) {
+template <class From>
+Result<SegmentValues> segments_at(const From& from, const std::vector<Ends>& segments,
+                                  const PathLookup::Instant& at, const Query& query) {
   PathLookup::Met met;
-  auto values = values_at(segments, at, query, met);
+  auto values = values_at(from, segments, at, query, met);
   if (!values) return tl::unexpected(std::move(values.error()));
-  SegmentValues found = values_of(segments, *std::move(values), at.t);
+  SegmentValues found = values_of(from, segments, *std::move(values), at.t);
   if (met.moving) found.stamp = time_of(at.t);
   return found;
 }
 
-Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Query& query) {
+template <class From>
+Result<SegmentValues> newest_segments(const From& from, const std::vector<Ends>& segments,
+                                      const Query& query) {
   PathLookup::Met met;
-  auto values = newest_values(segments, query.order, met);
+  auto values = newest_values(from, segments, query.order, met);
   if (!values) return tl::unexpected(std::move(values.error()));
   const HeldVersion* limiting = met.limiting;
-  SegmentValues found =
-      values_of(segments, *std::move(values), limiting != nullptr ? limiting->stamp : kAlways);
+  SegmentValues found = values_of(from, segments, *std::move(values),
+                                  limiting != nullptr ? limiting->stamp : kAlways);
   if (limiting == nullptr) return found;
   found.stamp = time_of(limiting->stamp);
+  // Others are asked for their newest instant at no cost, so none is guessed.
+  if constexpr (!std::is_same_v<From, Own>) return found;
   const std::int64_t before =
       limiting->number > 0 ? limiting->samples->stamp(limiting->number - 1) : kAlways;
   if (before != kAlways) found.period = std::chrono::nanoseconds(limiting->stamp - before);
@@ -259,7 +299,7 @@ Result<SegmentValues> newest_segments(const std::vector<Ends>& segments, const Q
 // The newest values, or that an edge has lost its samples. If one had none yet, they are those of
 // no instant.
 Result<SegmentValues> newest_or_cleared(const std::vector<Ends>& segments) {
-  auto newest = newest_segments(segments, {});
+  auto newest = newest_segments(Own(), segments, {});
   if (newest) {
     for_each_held(segments, [&](const HeldVersion& edge) {
       newest->unsampled = newest->unsampled || edge.unsampled();
@@ -273,6 +313,36 @@ Result<SegmentValues> newest_or_cleared(const std::vector<Ends>& segments) {
   return none;
 }
 
+// Those that a request asks for.
+template <class From>
+Result<SegmentValues> asked_segments(const From& from, const std::vector<Ends>& segments,
+                                     const Query& query, std::optional<Time> hint) {
+  const bool common = hint == query.at;
+  Result<SegmentValues> found =
+      query.at ? segments_at(from, segments, {nanoseconds(*query.at), common}, query)
+               : newest_segments(from, segments, query);
+  if (found && !query.at && found->stamp && query.age_noise_until) {
+    const std::chrono::nanoseconds period = found->period;
+    found = segments_at(from, segments, {nanoseconds(*found->stamp), true}, query);
+    if (found) found->period = period;
+  }
+  if (found && hint && found->stamp && hint != found->stamp) {
+    auto at_hint = segments_at(from, segments, {nanoseconds(*hint), true}, query);
+    if (at_hint) found->at_hint = static_cast<ValuesAtInstant&&>(*at_hint);
+  }
+  return found;
+}
+
+bool all_finite(const ValuesAtInstant& found) {
+  const auto finite = [](const Transform& X) { return is_finite(X); };
+  const auto sound = [&](const PathCorrelation& one) {
+    return (!one.unknown || finite({Pose(), *one.unknown})) &&
+           check_common_errors(one.common_errors).has_value();
+  };
+  return std::all_of(found.values.begin(), found.values.end(), finite) &&
+         std::all_of(found.correlations.begin(), found.correlations.end(), sound);
+}
+
 }  // namespace
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
@@ -281,24 +351,32 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
-  const bool common = hint == query.at;
-  Result<SegmentValues> found = query.at
-                                    ? segments_at(*ends, {nanoseconds(*query.at), common}, query)
-                                    : newest_segments(*ends, query);
-  if (found && !query.at && found->stamp && query.age_noise_until) {
-    const std::chrono::nanoseconds period = found->period;
-    found = segments_at(*ends, {nanoseconds(*found->stamp), true}, query);
-    if (found) found->period = period;
-  }
+  Result<SegmentValues> found = asked_segments(Own(), *ends, query, hint);
   if (!found) {
     return tl::unexpected(explained(std::move(found.error()), *ends, query, impl_->now_));
   }
   describe(*ends, *found);
   if (edges) tell_observed_with(*ends, *found);
-  if (hint && found->stamp && hint != found->stamp) {
-    auto at_hint = segments_at(*ends, {nanoseconds(*hint), true}, query);
-    if (at_hint) found->at_hint = static_cast<ValuesAtInstant&&>(*at_hint);
-  }
+  return found;
+}
+
+Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
+                                              const Query& query, std::optional<Time> hint,
+                                              const RemoteEdges& others) const {
+  const epoch::Guard guard;
+  const auto ends = all_ends(impl_->frames_, segments);
+  if (!ends) return tl::unexpected(ends.error());
+  RemoteReading reading(others);
+  Result<SegmentValues> found;
+  const auto read = [&](RemoteReading& now, SegmentValues& values) -> Result<void> {
+    auto asked = asked_segments(Others{now}, *ends, query, hint);
+    if (!asked) return tl::unexpected(std::move(asked.error()));
+    values = *std::move(asked);
+    return {};
+  };
+  if (!read_intact(reading, found, read) ||
+      (found && !(all_finite(*found) && all_finite(found->at_hint))))
+    return not_readable();
   return found;
 }
 
@@ -320,7 +398,7 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
         std::lower_bound(instants.begin(), instants.end(), nanoseconds(*newest->stamp));
     const auto count = std::min(static_cast<std::size_t>(end - instants.begin()), most);
     for (auto t = end - static_cast<std::ptrdiff_t>(count); t != end; ++t) {
-      auto then = segments_at(*ends, {*t}, {});
+      auto then = segments_at(Own(), *ends, {*t}, {});
       if (!then) continue;  // another edge has begun later
       then->commit = newest->commit;
       then->history = newest->history;

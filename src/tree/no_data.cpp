@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/saturating.hpp"
+#include "tree/held_edge.hpp"
 #include "tree/held_edges.hpp"
 
 namespace tfdude {
@@ -15,25 +16,44 @@ namespace {
 
 // A dynamic edge, with the stamps of its samples.
 struct DatedEdge {
-  const HeldVersion* edge = nullptr;
+  std::string_view id;
   std::int64_t oldest = 0;
   std::int64_t newest = 0;
   std::int64_t reach = 0;  // how far it can be extrapolated
+  bool unsampled = false;
+  bool lacks_sample = false;
 
-  [[nodiscard]] std::string name() const { return "the edge of " + quote(edge->name->text); }
+  [[nodiscard]] std::string name() const { return "the edge of " + quote(id); }
 };
 
-DatedEdge dated(const HeldVersion& edge) {
+template <class Edge>
+DatedEdge dated(std::string_view id, const Edge& from) {
+  const HeldVersion& edge = *from.version;
+  const auto samples = from.samples();
   // The oldest may be dropped meanwhile, but there always is a newest.
-  const std::int64_t oldest = edge.samples->stamp(edge.samples->oldest());
-  return {&edge, oldest == kAlways ? edge.stamp : std::min(oldest, edge.stamp), edge.stamp,
-          edge.samples->reach(edge.number)};
+  const Sample* oldest = samples.sample(samples.oldest());
+  return {id,
+          oldest == nullptr ? edge.stamp : std::min(oldest->stamp, edge.stamp),
+          edge.stamp,
+          samples.reach(edge.number),
+          edge.unsampled(),
+          edge.lacks_sample()};
 }
 
 std::vector<DatedEdge> dynamic_edges(const std::vector<Ends>& segments) {
   std::vector<DatedEdge> found;
   for_each_held(segments, [&](const HeldVersion& edge) {
-    if (edge.moving()) found.push_back(dated(edge));
+    if (edge.moving()) found.push_back(dated(edge.name->text, OwnEdge{&edge}));
+  });
+  return found;
+}
+
+std::vector<DatedEdge> dynamic_edges(const Ends& ends, RemoteReading& others) {
+  std::vector<DatedEdge> found;
+  for_each_edge(ends, others, [&](const Version& here, const auto& edge) {
+    if (edge.version != nullptr && edge.version->moving()) {
+      found.push_back(dated(here.name->text, edge));
+    }
   });
   return found;
 }
@@ -125,23 +145,19 @@ std::string all_of(const std::vector<DatedEdge>& edges, const DatedEdge& younges
          writer.instant(youngest.oldest) + " on";
 }
 
-}  // namespace
-
-Error explained(Error error, const std::vector<Ends>& segments, const Query& query,
-                const Forest::Clock& clock) {
-  if (!error.message.empty()) return error;
-  std::vector<DatedEdge> edges = dynamic_edges(segments);
+Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query,
+                   const Forest::Clock& clock) {
   // At the latest common time, an edge that had no sample yet has its first value.
   const auto lacks = std::find_if(edges.begin(), edges.end(), [&](const DatedEdge& one) {
-    return one.edge->lacks_sample() && (query.at || !one.edge->unsampled());
+    return one.lacks_sample && (query.at || !one.unsampled);
   });
   if (lacks != edges.end()) {
     error.message = lacks->name() + " has had no sample " +
-                    (lacks->edge->unsampled() ? "yet" : "since its history was cleared");
+                    (lacks->unsampled ? "yet" : "since its history was cleared");
     return error;
   }
   edges.erase(std::remove_if(edges.begin(), edges.end(),
-                             [](const DatedEdge& one) { return one.edge->unsampled(); }),
+                             [](const DatedEdge& one) { return one.unsampled; }),
               edges.end());
   const auto later = [](const DatedEdge& a, const DatedEdge& b) { return a.oldest < b.oldest; };
   const auto slower = [](const DatedEdge& a, const DatedEdge& b) { return a.newest < b.newest; };
@@ -169,6 +185,22 @@ Error explained(Error error, const std::vector<Ends>& segments, const Query& que
                    writer.span(limiting.oldest, limiting.newest) +
                    all_of(edges, *youngest, *slowest, writer);
   return error;
+}
+
+}  // namespace
+
+Error explained(Error error, const std::vector<Ends>& segments, const Query& query,
+                const Forest::Clock& clock) {
+  if (!error.message.empty()) return error;
+  return explained_by(std::move(error), dynamic_edges(segments), query, clock);
+}
+
+Error explained(Error error, const Ends& ends, RemoteReading& others, const Query& query,
+                const Forest::Clock& clock) {
+  if (!error.message.empty() || (error.code != Errc::kNotYet && error.code != Errc::kTooOld)) {
+    return error;
+  }
+  return explained_by(std::move(error), dynamic_edges(ends, others), query, clock);
 }
 
 }  // namespace tfdude

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "tree/frames.hpp"
+#include "tree/remote_edges.hpp"
 
 namespace tfdude {
 
@@ -13,5 +14,8 @@ namespace tfdude {
 /// @param clock  tells how long ago that was; null: nobody knows
 [[nodiscard]] Error explained(Error error, const std::vector<Ends>& segments, const Query& query,
                               const Forest::Clock& clock);
+/// The same for a path over edges that others hold.
+[[nodiscard]] Error explained(Error error, const Ends& ends, RemoteReading& others,
+                              const Query& query, const Forest::Clock& clock);
 
 }  // namespace tfdude

@@ -42,6 +42,8 @@ class RemoteForest {
   [[nodiscard]] std::uint64_t snapshot() const {
     return roots_->committed.load(std::memory_order_acquire);
   }
+  /// What changes with each commit.
+  [[nodiscard]] const std::atomic<std::uint64_t>& committed() const { return roots_->committed; }
   /// Whether what was read since then, at that commit, was overwritten by nothing.
   [[nodiscard]] bool intact(std::uint64_t snapshot) const {
     std::atomic_thread_fence(std::memory_order_acquire);

@@ -3,38 +3,23 @@
 #include "math/finite.hpp"
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/held_edges.hpp"
+#include "tree/no_data.hpp"
 #include "tree/path_walk.hpp"
+#include "tree/read_intact.hpp"
 
 // Lookups over edges that others hold, in the memory of their owners.
 namespace tfdude {
 namespace {
 
-// A test shows that it notices when this is left out.
-#ifdef TFDUDE_WITHOUT_HORIZON
-constexpr bool kAsksForHorizon = false;
-#else
-constexpr bool kAsksForHorizon = true;
-#endif
-
 bool finite(const Pose& X) { return is_finite(Transform{X, Covariance()}); }
 bool finite(const Transform& X) { return is_finite(X); }
 
-// Repeats what `compute` does as long as an owner overwrites meanwhile what was read: a writer at
-// full speed lets one of several thousand lookups begin again.
 template <class Value, class Compute>
 Result<Value> computed(const RemoteEdges& others, Compute compute) {
-  constexpr int kTries = 16;
   RemoteReading reading(others);
   Result<Value> X_AB;
-  bool intact = false;
-  for (int tries = 0; tries < kTries && !intact; ++tries) {
-    reading.clear();
-    if (tries > 0) X_AB = Value();
-    if (Result<void> ok = compute(reading, *X_AB); !ok) {
-      X_AB = tl::unexpected(std::move(ok.error()));
-    }
-    intact = !kAsksForHorizon || reading.intact();
-  }
+  const bool intact = read_intact(reading, X_AB, compute);
   // An owner has checked its values; another process may have written anything.
   if (!intact || (X_AB && reading.used() && !finite(*X_AB))) X_AB = not_readable();
   return X_AB;
@@ -59,6 +44,21 @@ Result<StampedTransform> queried(const Frames& frames, Name a, Name b, const Que
   return computed<StampedTransform>(others, [&](RemoteReading& reading, StampedTransform& X_AB) {
     return compute_queried(*found, query, reading, X_AB);
   });
+}
+
+// Whatever a reader can see of an edge has the number of a commit, and later ones are larger.
+std::optional<std::uint64_t> written_on(const Ends& ends, RemoteReading& reading) {
+  std::uint64_t sum = 14695981039346656037U;
+  bool all = true;
+  for_each_edge(ends, reading, [&](const Version& here, const auto& edge) {
+    all = all && edge.version != nullptr;
+    if (!all) return;
+    for (const std::uint64_t number :
+         {std::uint64_t{here.slot}, std::uint64_t{here.attachment}, edge.version->commit}) {
+      sum = (sum ^ number) * 1099511628211U;
+    }
+  });
+  return all ? std::optional(sum) : std::nullopt;
 }
 
 template <class Name>
@@ -105,6 +105,22 @@ Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b, 
 Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Query& query,
                                         const RemoteEdges& others) const {
   return queried(impl_->frames_, a, b, query, others);
+}
+std::optional<std::uint64_t> Forest::written(std::string_view a, std::string_view b,
+                                             const RemoteEdges& others) const {
+  const epoch::Guard guard;
+  const auto ends = impl_->frames_.ends(a, b);
+  if (!ends) return std::nullopt;
+  RemoteReading reading(others);
+  return written_on(*ends, reading);
+}
+Error Forest::explain(Error error, std::string_view a, std::string_view b, const Query& query,
+                      const RemoteEdges& others) const {
+  const epoch::Guard guard;
+  const auto ends = impl_->frames_.ends(a, b);
+  if (!ends) return error;
+  RemoteReading reading(others);
+  return tfdude::explained(std::move(error), *ends, reading, query, impl_->now_);
 }
 std::size_t Forest::bind(std::string_view a, std::string_view b, RemoteEdges& others) const {
   return bound(impl_->frames_, a, b, others);

@@ -1,3 +1,4 @@
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstring>
@@ -10,8 +11,10 @@
 #include <unistd.h>
 
 #include "memory/port.hpp"
+#include "memory/waiting.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/process.hpp"
 
 namespace tfdude {
 namespace {
@@ -23,8 +26,11 @@ constexpr std::uint64_t kLayout = 7;
 constexpr std::chrono::seconds kLong{10};
 
 struct Offering {
-  Offering() : memory(port->create(kSize).value()), offer(port->offer(kLayout).value()) {}
+  Offering()
+      : memory(port->create(kSize).value()),
+        offer(port->offer(kLayout, [this](bool waits) { anyone_waits = waits; }).value()) {}
 
+  std::atomic<bool> anyone_waits{false};
   std::unique_ptr<SharedMemory> port = make_linux_memory();
   OwnMemory memory;
   MemoryOffer offer;
@@ -57,6 +63,37 @@ TEST_CASE("what an owner writes is read in its memory") {
   CHECK(text_at(*seen).empty());
   std::strcpy(static_cast<char*>(owner.memory.at.get()), "hello");
   CHECK(text_at(*seen) == "hello");
+}
+
+TEST_CASE("a reader that waits is woken by what an owner writes, without a message") {
+  REQUIRE(can_wait_for_numbers());
+  Offering owner;
+  const auto reader = make_linux_memory();
+  auto seen = reader->attach(owner.offer, kLayout, ignore_end);
+  REQUIRE(seen);
+  auto& written = *static_cast<std::atomic<std::uint64_t>*>(owner.memory.at.get());
+  const auto& read = *static_cast<const std::atomic<std::uint64_t>*>(seen->at.get());
+  CHECK_FALSE(owner.anyone_waits);
+  seen->tell_waiting(true);
+  CHECK(testing::eventually([&] { return owner.anyone_waits.load(); }));
+  const auto begin = std::chrono::steady_clock::now();
+  // What was written before is not waited for.
+  written = 1;
+  wait_for_numbers({{&read, 0}}, begin + kLong);
+  auto woken = std::async(std::launch::async, [&] {
+    while (read == 1) wait_for_numbers({{&read, 1}}, begin + kLong);
+  });
+  written = 2;
+  wake_waiting(written);
+  CHECK(woken.wait_until(begin + kLong) == std::future_status::ready);
+  CHECK(std::chrono::steady_clock::now() - begin < kLong);
+  seen->tell_waiting(false);
+  CHECK(testing::eventually([&] { return !owner.anyone_waits; }));
+  seen->tell_waiting(true);
+  CHECK(testing::eventually([&] { return owner.anyone_waits.load(); }));
+  // A reader that is gone waits for nothing.
+  seen->at.reset();
+  CHECK(testing::eventually([&] { return !owner.anyone_waits; }));
 }
 
 TEST_CASE("nobody else can write to it, nor make it shrink") {

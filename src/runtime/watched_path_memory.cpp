@@ -1,0 +1,75 @@
+#include <utility>
+
+#include "runtime/memory_reads.hpp"
+#include "runtime/watched_path.hpp"
+#include "tree/epoch.hpp"
+
+// Watched paths that are read in the memory of their owners.
+namespace tfdude {
+
+bool WatchedPath::read_memory(Clock::time_point now) {
+  bool rerouted = false;
+  bool begins = false;
+  {
+    const Lock lock(mutex_);
+    next_.reset();
+    begins = !in_memory() || !route_in_memory_->is_same(planned_);
+    if (begins) {
+      const bool same = followed_ != nullptr && followed_->route().is_same(planned_);
+      rerouted = std::exchange(was_shown_, true) && !same;
+      asked_for_history_ = 0;
+      route_in_memory_ = std::move(planned_);
+      written_.reset();
+      // In this order readers find one of both.
+      memory_.store(others_, std::memory_order_seq_cst);
+      if (followed_ != nullptr) show(nullptr);
+    }
+  }
+  (void)look(now);
+  if (begins) tell();
+  return rerouted;
+}
+
+Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query& query) const {
+  auto found = memory.lookup_kept(a_, b_, query);
+  if (found) return found;
+  Error& why = found.error();
+  const bool newest = !query.at && !query.age_noise_until && query.order == Order::kSecond;
+  // While the path changes its route, or its edges have no instant in common.
+  if (newest && why.code != Errc::kNotYet) {
+    if (const auto* held = held_.load(std::memory_order_seq_cst)) return *held;
+    const Lock lock(mutex_);
+    if (newest_) return *newest_;
+  }
+  why = memory.explained(std::move(why), a_, b_, query);
+  if (why.message.empty()) why = {Errc::kNotYet, "the " + described() + " changes its route"};
+  return found;
+}
+
+Watched::Looked WatchedPath::look(Clock::time_point now) {
+  {
+    const epoch::Guard guard;
+    MemoryReads* memory = memory_.load(std::memory_order_seq_cst);
+    if (memory == nullptr) return {};
+    const auto written = memory->written(a_, b_);
+    const Lock lock(mutex_);
+    if (!written || written == written_ || !in_memory()) return {};
+    if (now < tell_from_) return {false, tell_from_};
+    if (options_.rate > 0) tell_from_ = now + watch_period(options_.rate);
+    written_ = written;
+    remember(memory->lookup_kept(a_, b_, {}));
+    messages_.fetch_add(1, std::memory_order_relaxed);
+  }
+  tell();
+  return {true};
+}
+
+std::set<Owner> WatchedPath::owners_in_memory() const {
+  std::set<Owner> owners;
+  const Lock lock(mutex_);
+  if (!route_in_memory_) return owners;
+  for (const Part& part : route_in_memory_->parts) owners.insert(part.owner);
+  return owners;
+}
+
+}  // namespace tfdude
