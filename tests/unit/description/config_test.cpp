@@ -233,7 +233,7 @@ TEST_CASE("a file of the wrong structure is rejected") {
   check_refused(
       {"frames:\n  - world\n", Errc::kConfig,
        "robot.yaml:2: frames[0] is not a mapping with the keys id, parent, xyz, rpy, quat, "
-       "matrix, stddev, cov, covariance, history, correlation, sources"});
+       "matrix, geodetic, stddev, cov, covariance, history, correlation, sources"});
   check_refused({"frames:\n  - {id: a}\n  - parent: a\n", Errc::kConfig,
                  "robot.yaml:3: frames[1]: id is missing"});
   check_refused({"partition: a\x04\nframes: []\n", Errc::kConfig,
@@ -253,7 +253,7 @@ TEST_CASE("an invalid frame is rejected by name and line") {
   check_refused(
       {camera("    pos: [1, 2, 3]"), Errc::kConfig,
        "robot.yaml:4: frame 'camera': unknown key 'pos'; known are id, parent, xyz, rpy, quat, "
-       "matrix, stddev, cov, covariance, history, correlation, sources"});
+       "matrix, geodetic, stddev, cov, covariance, history, correlation, sources"});
   check_refused({camera("    parent: world\n    xyz: [1, 2, 3]\n    xyz: [1, 2, 3]"), Errc::kConfig,
                  "robot.yaml:6: frame 'camera': xyz is given twice"});
   check_refused({camera("    xyz: [1, 2]"), Errc::kConfig,
