@@ -136,6 +136,7 @@ Error explained(Error error, const std::vector<Ends>& segments, const Query& que
     return one.edge->lacks_sample() && (query.at || !one.edge->unsampled());
   });
   if (lacks != edges.end()) {
+    error.frame = lacks->edge->name->text;
     error.message = lacks->name() + " has had no sample " +
                     (lacks->edge->unsampled() ? "yet" : "since its history was cleared");
     return error;
@@ -163,6 +164,10 @@ Error explained(Error error, const std::vector<Ends>& segments, const Query& que
     error.message += "its oldest sample is " + gap(t, limiting.oldest) + " later";
   } else {
     error.message += "it is no longer kept";
+  }
+  error.frame = limiting.edge->name->text;
+  if (youngest->oldest <= slowest->newest) {
+    error.available = Interval{time_of(youngest->oldest), time_of(slowest->newest)};
   }
   const bool single = limiting.oldest == limiting.newest;
   error.message += std::string("; it has ") + (single ? "one sample, of " : "samples from ") +
