@@ -1,6 +1,35 @@
 #include "tfdude/base/result.hpp"
 
+#include <cctype>
+#include <initializer_list>
+
 namespace tfdude {
+namespace {
+
+// What stands in quotes after the first of these words.
+std::string named_after(std::initializer_list<std::string_view> words, std::string_view text) {
+  std::size_t first = text.size();
+  std::size_t begin = first;
+  for (const std::string_view word : words) {
+    for (std::size_t at = text.find(word); at < first; at = text.find(word, at + 1)) {
+      if (at > 0 && std::isalnum(static_cast<unsigned char>(text[at - 1])) != 0) continue;
+      first = at;
+      begin = at + word.size();
+    }
+  }
+  const std::size_t end = text.find('\'', begin);
+  return end == std::string_view::npos ? "" : std::string(text.substr(begin, end - begin));
+}
+
+}  // namespace
+
+Error error_of_text(Errc code, std::string message) {
+  Error error{code, {}};
+  error.frame = named_after({"frame '", "frames '", "edge of '"}, message);
+  error.partition = named_after({"partition '"}, message);
+  error.message = std::move(message);
+  return error;
+}
 
 std::string_view to_string(Errc code) {
   switch (code) {

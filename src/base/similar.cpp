@@ -1,4 +1,4 @@
-#include "base/similar.hpp"
+#include "tfdude/base/similar.hpp"
 
 #include <algorithm>
 #include <cctype>

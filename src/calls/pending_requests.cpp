@@ -93,9 +93,12 @@ void PendingRequests::send(std::size_t i, Clock::time_point now, Clock::time_poi
 void PendingRequests::give_up() {
   for (std::size_t i = 0; i < requests_.size(); ++i) {
     if (!call_.waits(i)) continue;
-    call_.give_up(i, Error{Errc::kTimeout, "partition " + quote(call_.entries()[i].partition) +
-                                               " did not answer within " + limit_.text() +
-                                               " (asked " + std::to_string(sent_) + " times)"});
+    const std::string& partition = call_.entries()[i].partition;
+    call_.give_up(i, Error{Errc::kTimeout,
+                           "partition " + quote(partition) + " did not answer within " +
+                               limit_.text() + " (asked " + std::to_string(sent_) + " times)",
+                           {},
+                           partition});
   }
 }
 
@@ -114,6 +117,8 @@ std::vector<Reply> PendingRequests::take_replies() {
   std::size_t entry = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (parts_[i].owner != kHeldHere) replies_[i] = *call_.entries()[entry++].reply;
+    auto* error = std::get_if<Error>(&replies_[i].body);
+    if (error != nullptr && error->partition.empty()) error->partition = parts_[i].partition;
   }
   return std::move(replies_);
 }

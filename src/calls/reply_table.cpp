@@ -88,9 +88,11 @@ void ReplyTable::on_lost(const std::string& partition) {
       const Waiting waiting = one->second;
       one = waiting_.erase(one);
       auto& entry = waiting.call->entries_[waiting.entry];
-      entry.reply = Reply{
-          entry.sequence, 0,
-          Error{Errc::kUnreachable, "partition " + quote(partition) + " left before it replied"}};
+      entry.reply = Reply{entry.sequence, 0,
+                          Error{Errc::kUnreachable,
+                                "partition " + quote(partition) + " left before it replied",
+                                {},
+                                partition}};
       if (!waiting.call->complete()) continue;
       waiting.call->arrived_->notify_one();
       if (waiting.call->listener_ != nullptr) listeners.push_back(waiting.call->listener_);

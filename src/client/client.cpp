@@ -16,6 +16,11 @@ Result<StampedTransform> look_up(Lookups& lookups, std::string_view a, std::stri
   return lookups.lookup(a, b, query);
 }
 
+// A call that follows has the right error if it does not come.
+void await_frame(Lookups& lookups, const std::string& id, const Deadline& deadline) {
+  if (!deadline.over()) (void)lookups.wait(id, id, {}, deadline.left());
+}
+
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
                                  const std::vector<double>& positions,
                                  const std::vector<double>& variances, std::optional<Time> stamp) {
@@ -166,7 +171,8 @@ Result<void> Client::update_joints(std::vector<JointValue> joints, std::optional
   return participant_->joints().update({std::move(joints), stamp});
 }
 
-Result<std::vector<JointInfo>> Client::joints(const std::string& partition) {
+Result<std::vector<JointInfo>> Client::joints(const std::string& partition, Milliseconds wait) {
+  participant_->discovery().wait_for_partition(partition, Deadline(wait));
   return participant_->joints().list(partition);
 }
 
@@ -310,7 +316,9 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
 }
 
 Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
-                                       const WatchOptions& options) {
+                                       const WatchOptions& options, Milliseconds wait) {
+  const Deadline deadline(wait);
+  for (const std::string& id : ids) await_frame(participant_->lookups(), id, deadline);
   return participant_->watches().watch_edges(ids, options).map([](auto edges) {
     return EdgesWatch(edges);
   });
@@ -338,6 +346,9 @@ Result<void> Client::wait_until(Time time, Milliseconds wait) {
 
 Result<void> Client::set_time(Time now) { return participant_->set_time(now, true); }
 Result<void> Client::publish_clock(Time now) { return participant_->publish_clock(now); }
+Result<void> Client::advance_to(ExternalTime time, Milliseconds wait) {
+  return participant_->advance_to(stamp_of(time), Deadline(wait));
+}
 
 Result<PartitionWatch> Client::watch_partition(const std::string& partition,
                                                const PartitionWatchOptions& options) {
@@ -378,11 +389,14 @@ Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& part
   return participant_->observations().consistency(partition);
 }
 
-Result<std::vector<HistoryInfo>> Client::history(const std::string& id) {
+Result<std::vector<HistoryInfo>> Client::history(const std::string& id, Milliseconds wait) {
+  await_frame(participant_->lookups(), id, Deadline(wait));
   return participant_->queries().history(id);
 }
 
-Result<std::vector<HistoryInfo>> Client::histories(const std::string& partition) {
+Result<std::vector<HistoryInfo>> Client::histories(const std::string& partition,
+                                                   Milliseconds wait) {
+  participant_->discovery().wait_for_partition(partition, Deadline(wait));
   return participant_->queries().histories(partition);
 }
 
@@ -411,6 +425,12 @@ Result<std::vector<std::string>> Client::children(const std::string& id) {
 Result<std::vector<std::string>> Client::roots() { return participant_->queries().roots(); }
 
 bool Client::exists(const std::string& id) { return participant_->queries().info(id).has_value(); }
+
+Result<bool> Client::whether_exists(const std::string& id) {
+  const auto info = participant_->queries().info(id);
+  if (!info && !is_unknown(info.error().code)) return tl::unexpected(info.error());
+  return info.has_value();
+}
 
 Result<std::vector<Frame>> Client::frames() { return participant_->queries().frames(); }
 

@@ -170,6 +170,13 @@ struct DescriptionRequest {
 /// is the name of the partition asked.
 struct MemoryRequest {};
 
+/// Asks whether the external clock of the partition shows a time; absent: whether it has any.
+/// Answered with Done, also if it uses the system's clock, or kNotYet. The request's id is the name
+/// of the partition asked.
+struct TimeRequest {
+  std::optional<Time> shown{};
+};
+
 /// The last character of an entry of FramesRequest::trees that is the beginning of ids.
 inline constexpr char kAnyName = '*';
 
@@ -183,7 +190,7 @@ struct Request {
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
-               DescriptionRequest, MemoryRequest>
+               DescriptionRequest, MemoryRequest, TimeRequest>
       body;
   /// The sender awaits no replies of this partition to requests with lower numbers, in whatever
   /// order they come. Not greater than the full number of this request, of which `sequence` has the

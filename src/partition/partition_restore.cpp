@@ -160,7 +160,7 @@ bool Partition::release(const std::string& id, std::optional<LamportTime> droppe
 Result<void> Partition::release(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
     const auto there = forest_.info(id);
-    if (!there) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    if (!there) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
     if (there->owner == kHeldHere) continue;
     return fail(Errc::kNotOwner, "frame " + quote(id) + " belongs to partition " +
                                      quote(directory_.name(there->owner)) + ", not to " +

@@ -16,7 +16,7 @@ bool is_read_only(const Request& request) {
   const auto* remove = std::get_if<RemoveRequest>(&request.body);
   if (remove != nullptr) return remove->tops.empty();
   return is_one_of<LookupRequest, HistoryRequest, JointsRequest, ConsistencyRequest, FramesRequest,
-                   DescriptionRequest, MemoryRequest>(request);
+                   DescriptionRequest, MemoryRequest, TimeRequest>(request);
 }
 
 bool is_change(const Request& request) {

@@ -12,7 +12,7 @@ namespace tfdude {
 namespace {
 
 tl::unexpected<Error> unknown_frame(std::string_view id) {
-  return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
 }
 
 Result<void> check_reachable(const Directory& directory, Owner owner) {
@@ -21,10 +21,12 @@ Result<void> check_reachable(const Directory& directory, Owner owner) {
   const bool discovered = !info.host.empty();
   const std::string process =
       discovered ? " (host " + info.host + ", pid " + std::to_string(info.pid) + ")" : "";
-  return fail(Errc::kUnreachable, "partition " + quote(info.name) + process +
-                                      " has not been reachable since " + to_string(info.since) +
-                                      (discovered ? "" : ", before this process started") +
-                                      ": it " + why_absent(info));
+  return fail_about_partition(Errc::kUnreachable,
+                              "partition " + quote(info.name) + process +
+                                  " has not been reachable since " + to_string(info.since) +
+                                  (discovered ? "" : ", before this process started") + ": it " +
+                                  why_absent(info),
+                              info.name);
 }
 
 // The owner's part. If it does not exist yet, creates it with this id and an empty body of this
@@ -95,7 +97,10 @@ Result<Part> route_to(const Directory& directory, Owner owner, Request request) 
 
 Result<Part> route_to_partition(const Directory& directory, Request request) {
   const auto owner = directory.owner(request.id);
-  if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(request.id));
+  if (!owner) {
+    return fail_about_partition(Errc::kUnknownPartition, "no partition " + quote(request.id),
+                                request.id);
+  }
   return route_to(directory, *owner, std::move(request));
 }
 

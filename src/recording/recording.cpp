@@ -364,7 +364,7 @@ Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string
 
 Result<std::string> Recording::parent(const std::string& id) const {
   const auto info = impl_->state().forest().info(id);
-  if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  if (!info) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
   return info->parent;
 }
 
@@ -407,7 +407,7 @@ Result<std::vector<HistoryInfo>> Recording::history(const std::string& id) {
     }
     return true;
   });
-  if (!found) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  if (!found) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
   if (!gaps.newest) return std::vector<HistoryInfo>();
   return std::vector<HistoryInfo>{gaps.info(id)};
 }

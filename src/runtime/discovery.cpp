@@ -70,6 +70,17 @@ Result<void> Discovery::nobody_but_excluded() const {
   return fail(Errc::kNotPermitted, "no partition answers: " + excluded.front());
 }
 
+void Discovery::wait_for_partition(const std::string& name, const Deadline& deadline) {
+  // A partition that hangs for a moment is reachable again without a change of the structure.
+  constexpr Milliseconds kLook{50};
+  Lock lock(structure_.mutex);
+  while (!deadline.over()) {
+    const auto owner = structure_.directory.owner(name);
+    if (owner && (*owner == kHeldHere || structure_.directory.reachable(*owner))) return;
+    (void)structure_.changed.wait_until(lock, deadline.within(kLook).at());
+  }
+}
+
 Error Discovery::last_word(Error error, const TimeLimit& limit) {
   if (!may_appear(error.code)) return error;
   return complete() ? explained(std::move(error)) : undecided(error.message, limit);
@@ -84,22 +95,24 @@ Error Discovery::explained(Error error) {
   // Before the lock is taken: the transport has a lock of its own.
   if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
     return {Errc::kIncompatible,
-            error.message + ", as far as is known: " + strangers.front().text()};
+            error.message + ", as far as is known: " + strangers.front().text(), error.frame};
   }
   const auto excluded = transport_.excluded();
   const std::string about_keys = excluded.empty() ? "" : "; " + excluded.front();
   const Lock lock(structure_.mutex);
   if (structure_.directory.partitions().empty()) {
-    if (!excluded.empty()) return {Errc::kNotPermitted, error.message + about_keys};
-    return {error.code, error.message + "; no partition answers: " + kHint};
+    if (!excluded.empty()) return {Errc::kNotPermitted, error.message + about_keys, error.frame};
+    error.message += std::string("; no partition answers: ") + kHint;
+    return error;
   }
   error.message += about_keys;
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
-  return {Errc::kUnreachable, error.message + "; it may belong to partition " +
-                                  quote(missed->name) + ", which has not been reachable since " +
-                                  to_string(missed->since) + ", before this process started: it " +
-                                  why_absent(*missed)};
+  return {Errc::kUnreachable,
+          error.message + "; it may belong to partition " + quote(missed->name) +
+              ", which has not been reachable since " + to_string(missed->since) +
+              ", before this process started: it " + why_absent(*missed),
+          error.frame, missed->name};
 }
 
 Error Discovery::undecided(const std::string& what, const TimeLimit& limit) {

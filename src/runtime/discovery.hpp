@@ -45,6 +45,9 @@ class Discovery {
   /// exclude all partitions that were discovered.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
+  /// Waits until a partition of this name is known and reachable.
+  void wait_for_partition(const std::string& name, const Deadline& deadline);
+
   /// The final error of an operation that failed and is not repeated.
   [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
 

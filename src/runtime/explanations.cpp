@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/similar.hpp"
 
-#include "base/similar.hpp"
 #include "calls/lookup_in_progress.hpp"
 #include "math/variance_shares.hpp"
 #include "partition/observing.hpp"

@@ -40,6 +40,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       many_lookups_(context_, lookups_, two_instants_),
       explanations_(context_, lookups_, queries_, joints_),
       descriptions_(requests_, options.description),
+      advances_(context_),
       streams_(context_) {
   const Lock lock(structure_.mutex);
   if (!wants_pages()) structure_.directory.do_without_pages();
@@ -125,6 +126,11 @@ Result<void> Participant::publish_clock(Time now) {
   return transport_->publish_clock(now);
 }
 
+Result<void> Participant::advance_to(Time time, const Deadline& deadline) {
+  if (auto sent = publish_clock(time); !sent) return sent;
+  return advances_.await_others(time, deadline);
+}
+
 std::optional<Reply> Participant::answer_query(const Request& request,
                                                const std::optional<PeerId>& from) {
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
@@ -142,6 +148,7 @@ std::optional<Reply> Participant::answer_query(const Request& request,
   if (std::holds_alternative<MemoryRequest>(request.body)) {
     return memory_.answer(request, member_.incarnation());
   }
+  if (std::holds_alternative<TimeRequest>(request.body)) return advances_.answer(request);
   return std::nullopt;
 }
 

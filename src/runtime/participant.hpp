@@ -11,6 +11,7 @@
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/refused.hpp"
 
+#include "runtime/advances.hpp"
 #include "runtime/context.hpp"
 #include "runtime/descriptions.hpp"
 #include "runtime/explanations.hpp"
@@ -78,6 +79,8 @@ class Participant final : public TransportHandler,
   /// Sends the time to others with an external clock, and sets the own one, if it is external.
   /// @return kInvalidInput; as Transport::publish_clock()
   [[nodiscard]] Result<void> publish_clock(Time now);
+  /// The same, until all owners with an external clock show it. @return as Client::advance_to()
+  [[nodiscard]] Result<void> advance_to(Time time, const Deadline& deadline);
 
   /// Waits until data sent on reliable streams is acknowledged. @return kTimeout, kTransport
   [[nodiscard]] Result<void> flush(Milliseconds wait) {
@@ -169,6 +172,7 @@ class Participant final : public TransportHandler,
   ManyLookups many_lookups_;
   Explanations explanations_;
   Descriptions descriptions_;
+  Advances advances_;
   std::atomic<std::uint64_t> jumps_{0};  // of the clock
   Streams streams_;
 };

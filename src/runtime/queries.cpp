@@ -30,7 +30,7 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
 Result<Handle> Queries::find(std::string_view id) {
   const auto find = [&](const Directory&) -> Result<Handle> {
     const auto handle = structure_.forest.find(id);
-    if (!handle) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    if (!handle) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
     return *handle;
   };
   return requests_.find(discovery_.call_deadline(), {std::string(id)}, Task::kFresh, find);
@@ -39,7 +39,7 @@ Result<Handle> Queries::find(std::string_view id) {
 Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline) {
   const auto find = [&](const Directory&) -> Result<FrameInfo> {
     auto info = structure_.forest.info(id);
-    if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    if (!info) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
     return *std::move(info);
   };
   return requests_.find(deadline, {id}, Task::kFresh, find);
@@ -152,7 +152,7 @@ Result<std::vector<HistoryInfo>> Queries::history(const std::string& id) {
   auto asked = requests_.ask_one<std::vector<HistoryInfo>>(
       discovery_.call_deadline(), {id}, [&](const Directory& directory) -> Result<Part> {
         const auto info = structure_.forest.info(id);
-        if (!info) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        if (!info) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
         return route_to(directory, info->owner, Request{0, id, HistoryRequest{}});
       });
   if (!asked) return tl::unexpected(std::move(asked.error()));

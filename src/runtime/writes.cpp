@@ -101,7 +101,7 @@ Result<void> Writes::correlate(const std::string& id, const Correlation& correla
   return requests_.change(
       discovery_.call_deadline(), {id}, [&](const Directory& directory) -> Result<Part> {
         const auto frame = structure_.forest.info(id);
-        if (!frame) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+        if (!frame) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
         if (auto ok = check_common_errors(correlation.common_errors); !ok) {
           return fail_at("frame " + quote(id), ok.error());
         }

@@ -155,7 +155,7 @@ Result<std::vector<std::string>> Forest::children(std::string_view id) const {
   const Writing lock(impl_->mutex_);
   const Version* version = impl_->frames_.newest_named(id);
   if (version == nullptr || !version->present()) {
-    return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
   }
   std::vector<std::string> ids;
   impl_->graph_.for_each_child(version->slot, [&](std::uint32_t child) {

@@ -5,16 +5,18 @@
 namespace tfdude {
 
 tl::unexpected<Error> unknown_start(std::string_view id) {
-  return fail(Errc::kUnknownStart, "no frame " + quote(id) + " to start from");
+  return fail_about_frame(Errc::kUnknownStart, "no frame " + quote(id) + " to start from", id);
 }
 
 tl::unexpected<Error> unknown_end(std::string_view id) {
-  return fail(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at");
+  return fail_about_frame(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at", id);
 }
 
 tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
-  return fail(Errc::kNotConnected, "frames " + quote(a.name->text) + " and " + quote(b.name->text) +
-                                       " have no common root");
+  return fail_about_frame(
+      Errc::kNotConnected,
+      "frames " + quote(a.name->text) + " and " + quote(b.name->text) + " have no common root",
+      a.name->text);
 }
 
 const Version* Frames::named(std::string_view id, std::uint64_t commit) const {
@@ -54,7 +56,9 @@ Result<Ends> Frames::ends(Handle a, Handle b) const {
 
 Result<const HeldVersion*> Frames::held_value(std::string_view id) const {
   const Version* version = present(id, snapshot());
-  if (version == nullptr) return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+  if (version == nullptr) {
+    return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
+  }
   if (!version->held()) {
     return fail(Errc::kNotOwner, "frame " + quote(id) + " is owned by another partition");
   }
@@ -82,7 +86,7 @@ const Version* Frames::newest_named(std::string_view id) const {
 Result<std::uint32_t> Frames::held_slot(std::string_view id) const {
   const Version* version = newest_named(id);
   if (version == nullptr || !version->present()) {
-    return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+    return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
   }
   if (!version->held()) {
     return fail(Errc::kNotOwner, "frame " + quote(id) + " is owned by another partition");

@@ -152,6 +152,7 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
     return one.lacks_sample && (query.at || !one.unsampled);
   });
   if (lacks != edges.end()) {
+    error.frame = lacks->edge->name->text;
     error.message = lacks->name() + " has had no sample " +
                     (lacks->unsampled ? "yet" : "since its history was cleared");
     return error;
@@ -179,6 +180,10 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
     error.message += "its oldest sample is " + gap(t, limiting.oldest) + " later";
   } else {
     error.message += "it is no longer kept";
+  }
+  error.frame = limiting.edge->name->text;
+  if (youngest->oldest <= slowest->newest) {
+    error.available = Interval{time_of(youngest->oldest), time_of(slowest->newest)};
   }
   const bool single = limiting.oldest == limiting.newest;
   error.message += std::string("; it has ") + (single ? "one sample, of " : "samples from ") +

@@ -1,10 +1,12 @@
 // Waits of calls that read, and being told: watched values, messages with stamps, the clock.
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -12,6 +14,7 @@
 #include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
+#include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
@@ -276,6 +279,75 @@ TEST_CASE("waiting: until a time of the client's clock") {
               [&] { CHECK(node->set_time(instant(10))); }));
   CHECK(system->wait_until(*system->now() + 10ms, 20s));
   CHECK_FALSE(system->wait_until(*system->now() + std::chrono::hours(1), 1ms));
+}
+
+TEST_CASE("calls about the structure wait for what comes later") {
+  const testing::Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  Node base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  Client client = Client::open(join("")).value();
+  REQUIRE(client.exists("world"));
+  std::optional<Node> arm;
+  const auto open_arm = [&] {
+    FrameSpec upper{"upper", "world", {}};
+    upper.joint = testing::revolute_named("shoulder");
+    arm.emplace(Node::open(join("arm"), "arm", {upper, {"hand", "upper", ahead(1)}}).value());
+  };
+  SECTION("history") {
+    CHECK(client.history("hand").error().code == Errc::kUnknownFrame);
+    CHECK(client.history("hand", 20ms).error().code == Errc::kUnknownFrame);
+    CHECK(after([&] { return client.history("hand", 10s); }, open_arm));
+  }
+  SECTION("histories") {
+    CHECK(client.histories("arm", 20ms).error().code == Errc::kUnknownPartition);
+    CHECK(after([&] { return client.histories("arm", 10s); }, open_arm));
+  }
+  SECTION("joints") {
+    CHECK(client.joints("arm", 20ms).error().code == Errc::kUnknownPartition);
+    const auto joints = after([&] { return client.joints("arm", 10s); }, open_arm);
+    REQUIRE(joints);
+    CHECK(joints->at(0).name == "shoulder");
+  }
+  SECTION("watched edges") {
+    CHECK(client.watch_edges({"hand"}, {}, 20ms).error().code == Errc::kUnknownFrame);
+    const auto watch = after(
+        [&] {
+          return client.watch_edges({"upper", "hand"}, {}, 10s);
+        },
+        open_arm);
+    REQUIRE(watch);
+    CHECK(eventually([&] { return watch->lookup("upper", "hand").has_value(); }));
+  }
+}
+
+TEST_CASE("whether a frame exists is told from not knowing it") {
+  const testing::Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  Node base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  Client client = Client::open(join("")).value();
+  CHECK(client.whether_exists("world").value());
+  CHECK_FALSE(client.whether_exists("nowhere").value());
+  CHECK_FALSE(client.exists("nowhere"));
+}
+
+TEST_CASE("nobody can say whether a frame of a partition that was lost before exists") {
+  const testing::Join join = testing::join_loopback();
+  Node base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  {
+    const Node arm = Node::open(join("arm"), "arm", {{"hand", "world", {}}}).value();
+    REQUIRE(eventually([&] { return base.exists("hand"); }));
+  }
+  REQUIRE(eventually([&] {
+    const auto partitions = base.partitions().value();
+    return std::any_of(partitions.begin(), partitions.end(), [](const PartitionInfo& one) {
+      return one.name == "arm" && !one.reachable;
+    });
+  }));
+  Client late = Client::open(join("")).value();
+  Result<bool> exists;
+  REQUIRE(eventually([&] { return !(exists = late.whether_exists("nowhere")); }));
+  CHECK(exists.error().code == Errc::kUnreachable);
+  CHECK(exists.error().frame == "nowhere");
+  CHECK(exists.error().partition == "arm");
+  CHECK_FALSE(late.exists("nowhere"));
 }
 
 }  // namespace tfdude

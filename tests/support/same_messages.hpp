@@ -196,6 +196,8 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(listed(std::get<FramesRequest>(actual.body)) == listed(*frames));
   } else if (const auto* description = std::get_if<DescriptionRequest>(&expected.body)) {
     CHECK(std::get<DescriptionRequest>(actual.body).from == description->from);
+  } else if (const auto* time = std::get_if<TimeRequest>(&expected.body)) {
+    CHECK(std::get<TimeRequest>(actual.body).shown == time->shown);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

@@ -142,6 +142,7 @@ bool take(const Bytes& bytes) {
       {32, "base", FramesRequest{{}, {"arm", "left_*"}, {{"arms", kLastCounter}, {"legs", 1}}}},
       {33, "arm", DescriptionRequest{18446744073709551615ULL}},
       {34, "arm", MemoryRequest{}},
+      {35, "arm", TimeRequest{time_of(5)}},
       {40, "hand", AddRequest{"arm", unspecified(random), 1}},
       {41, "hand",
        UpdateRequest{{{"hand", unspecified(random)}, {"arm", unspecified(random)}}, time_of(1)}},

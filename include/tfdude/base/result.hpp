@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -8,6 +9,7 @@
 #include <tl/expected.hpp>
 
 #include "tfdude/base/export.hpp"
+#include "tfdude/base/time.hpp"
 
 namespace tfdude {
 
@@ -48,10 +50,26 @@ enum class Errc : std::uint8_t {
 /// Whether the code says that something does not exist.
 [[nodiscard]] TFDUDE_EXPORT bool is_unknown(Errc code);
 
-/// An error for people: the message names the frame, the partition and the value concerned.
+/// The instants from one to another, both included.
+struct Interval {
+  Time from{};
+  Time until{};
+
+  friend bool operator==(const Interval& a, const Interval& b) {
+    return a.from == b.from && a.until == b.until;
+  }
+};
+
+/// An error for people: the message names the frame, the partition and the value concerned. Errors
+/// of lookups also have these as data.
 struct Error {
   Errc code;
   std::string message;
+  std::string frame{};      ///< that is missing, or whose edge is the cause; empty: see the message
+  std::string partition{};  ///< that is missing, does not answer, or has answered; empty: not known
+  /// kNotYet, kTooOld: when all dynamic edges have data. Absent if they have no instant in common,
+  /// or if another process has answered by a message, whose text says it.
+  std::optional<Interval> available{};
 };
 
 template <class T>
@@ -62,9 +80,23 @@ using Result = tl::expected<T, Error>;
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }
 
+/// The same, about a frame or a partition.
+[[nodiscard]] inline tl::unexpected<Error> fail_about_frame(Errc code, std::string message,
+                                                            std::string_view frame) {
+  return tl::unexpected<Error>(Error{code, std::move(message), std::string(frame)});
+}
+[[nodiscard]] inline tl::unexpected<Error> fail_about_partition(Errc code, std::string message,
+                                                                std::string_view partition) {
+  return tl::unexpected<Error>(Error{code, std::move(message), {}, std::string(partition)});
+}
+
+/// An error that came as a text: names the first frame and the first partition of the text.
+[[nodiscard]] TFDUDE_EXPORT Error error_of_text(Errc code, std::string message);
+
 /// Prefixes the error with the place where it happened: "frame 'arm_1': stddev[2]: ...".
-[[nodiscard]] inline tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
-  return fail(error.code, place + ": " + error.message);
+[[nodiscard]] inline tl::unexpected<Error> fail_at(const std::string& place, Error error) {
+  error.message.insert(0, place + ": ");
+  return tl::unexpected<Error>(std::move(error));
 }
 
 }  // namespace tfdude

@@ -14,6 +14,21 @@ using Time = std::chrono::time_point<std::chrono::system_clock, std::chrono::nan
 
 using Milliseconds = std::chrono::milliseconds;
 
+/// The clock of a simulation or a replay. It is none of this computer, so it has no now(), and its
+/// times are of a type of their own: those of the system's clock do not compile in their place.
+struct ExternalClock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<ExternalClock>;
+  static constexpr bool is_steady = false;
+};
+/// Time since the start of a simulation: `ExternalTime(20ms)`.
+using ExternalTime = ExternalClock::time_point;
+
+/// As a stamp, which calls take of both clocks.
+[[nodiscard]] constexpr Time stamp_of(ExternalTime time) { return Time(time.time_since_epoch()); }
+
 /// The clock that a participant's stamps are of.
 enum class ClockKind : std::uint8_t {
   kSystem,

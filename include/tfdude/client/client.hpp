@@ -176,9 +176,10 @@ class TFDUDE_EXPORT Client {
                                            std::optional<Time> stamp = std::nullopt);
 
   /// The joints of a partition and their positions, sorted by name. One round trip per kMaxItems of
-  /// them.
+  /// them, after `wait` for the partition.
   /// @return kUnknownPartition.
-  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition);
+  [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition,
+                                                      Milliseconds wait = {});
 
   /// The robot description (URDF) of a partition, Options::description of its Node; empty: it has
   /// none. One round trip per 32 KiB.
@@ -325,11 +326,12 @@ class TFDUDE_EXPORT Client {
 
   /// As watch(), for the edges of these frames, wherever they are: to follow many edges. While an
   /// owner is unreachable or an edge does not exist, the others get nothing new for more than
-  /// seconds either, so watch the edges of each owner separately.
+  /// seconds either, so watch the edges of each owner separately. Waits before for the frames.
   /// @return kUnknownFrame; kInvalidInput (no edges, a root, more than kMaxItems of one owner,
   ///   `composed`).
   [[nodiscard]] Result<EdgesWatch> watch_edges(const std::vector<std::string>& ids,
-                                               const WatchOptions& options = {});
+                                               const WatchOptions& options = {},
+                                               Milliseconds wait = {});
 
   /// The mean velocity of frame b in frame a over an interval: the difference of its poses at both
   /// ends, divided by the length. The counterpart of tf2's lookupVelocity(b, a, time, interval):
@@ -355,6 +357,9 @@ class TFDUDE_EXPORT Client {
   /// Waits until this client's clock (Options::clock) has reached a time.
   /// @return kTimeout: not within `wait` of the system's time; the message says what time it is
   [[nodiscard]] Result<void> wait_until(Time time, Milliseconds wait);
+  [[nodiscard]] Result<void> wait_until(ExternalTime time, Milliseconds wait) {
+    return wait_until(stamp_of(time), wait);
+  }
 
   /// Sets the external clock of this client, for simulators that embed it and for tests. If the
   /// time is earlier than before, a Node clears the histories of its edges that have samples at
@@ -362,6 +367,7 @@ class TFDUDE_EXPORT Client {
   /// structure and static edges stay. Samples that were on their way then are rejected.
   /// @return kInvalidInput: a negative time; the client uses the system's clock.
   [[nodiscard]] Result<void> set_time(Time now);
+  [[nodiscard]] Result<void> set_time(ExternalTime now) { return set_time(stamp_of(now)); }
 
   /// Sends the time to all participants of the domain with an external clock, and sets that of this
   /// client, if it has one. Not acknowledged: a value may be lost. Participants that start later
@@ -370,6 +376,16 @@ class TFDUDE_EXPORT Client {
   /// that is earlier than the one before clears histories.
   /// @return kInvalidInput: a negative time; kNotPermitted, kTransport.
   [[nodiscard]] Result<void> publish_clock(Time now);
+  [[nodiscard]] Result<void> publish_clock(ExternalTime now) {
+    return publish_clock(stamp_of(now));
+  }
+
+  /// As publish_clock(), acknowledged: returns when the clocks of all reachable owners show the
+  /// time, for simulations in lock-step. Other clients are not waited for. One round trip, if
+  /// nothing is lost. Nobody else may publish the time.
+  /// @return kInvalidInput, kNotPermitted, kTransport as publish_clock(); kTimeout: not within
+  ///   `wait`, naming an owner; kUnsupported: an owner of protocol 1.0
+  [[nodiscard]] Result<void> advance_to(ExternalTime time, Milliseconds wait);
 
   /// Asks the owner of a partition to push all its values and their changes, and reports them with
   /// the partition's structure to a function: for displays and recordings of whole robots. Returns
@@ -426,11 +442,14 @@ class TFDUDE_EXPORT Client {
   /// observed since its process started; at most kMaxItems. @return kUnknownPartition.
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
-  /// Statistics of an edge's history; empty for a static edge. @return kUnknownFrame.
-  [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
-  /// As history(), for the dynamic edges of a partition; at most kMaxItems. @return
-  /// kUnknownPartition.
-  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
+  /// Statistics of an edge's history; empty for a static edge. Waits before for the frame.
+  /// @return kUnknownFrame.
+  [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id,
+                                                         Milliseconds wait = {});
+  /// As history(), for the dynamic edges of a partition, which is waited for; at most kMaxItems.
+  /// @return kUnknownPartition.
+  [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition,
+                                                           Milliseconds wait = {});
 
   /// Finds a frame once, for later calls without hashing. @return kUnknownFrame.
   /// @note This function and all below send no requests. They answer from this process's replica of
@@ -452,8 +471,11 @@ class TFDUDE_EXPORT Client {
   /// Frames without an existing parent, sorted.
   [[nodiscard]] Result<std::vector<std::string>> roots();
   /// Whether a frame with this id is known here at the deadline at the latest. False also if that
-  /// could not be determined, as without a network; parent() tells the two cases apart.
+  /// could not be determined, as without a network; whether_exists() tells the two apart.
   [[nodiscard]] bool exists(const std::string& id);
+  /// Whether a frame with this id exists. Beware: the Result is true also if its value is false.
+  /// @return kTimeout, kUnreachable, kIncompatible, kNotPermitted: nobody can say now.
+  [[nodiscard]] Result<bool> whether_exists(const std::string& id);
   /// All frames, sorted by id; also those of partitions that were lost before this process started,
   /// as an owner of others knows them.
   [[nodiscard]] Result<std::vector<Frame>> frames();

@@ -25,8 +25,17 @@ struct ErrorText : LongText {
   }
 };
 
+// The code was read before.
+struct ErrorMessage : ErrorText {
+  void write(const Error& error, std::string& wire) const { LongText::write(error.message, wire); }
+  static Result<void> read(const std::string& wire, Error& error, const Place&) {
+    error = error_of_text(error.code, printable(wire));
+    return {};
+  }
+};
+
 constexpr auto kError = record(TFDUDE_FIELD(code, code, Octet()),
-                               TFDUDE_FIELD(message, message, ErrorText{{kMaxMessage}}));
+                               TFDUDE_FIELD_OF_ALL(message, ErrorMessage{{{kMaxMessage}}}));
 
 // ---- values of segments
 

@@ -196,6 +196,8 @@ struct MemoryOctet : Octet {
   static Result<void> read(std::uint8_t, MemoryRequest&, const Place&) { return {}; }
 };
 
+constexpr auto kTime = record(TFDUDE_FIELDS(shown, Stamp("the time of a request")));
+
 // ---- all of them
 
 constexpr auto kBody = cases(
@@ -215,7 +217,8 @@ constexpr auto kBody = cases(
     TFDUDE_CASE(16, ForgetRequest, forget, kForget), SignOfLife<kProbe>(),
     TFDUDE_CASE(18, FramesRequest, structure, kFrames),
     TFDUDE_CASE(19, DescriptionRequest, description, kDescription),
-    TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()));
+    TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()),
+    TFDUDE_CASE(21, TimeRequest, time, kTime));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

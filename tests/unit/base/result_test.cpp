@@ -87,6 +87,34 @@ TEST_CASE("fail_at prepends the place and keeps the code") {
   CHECK(result.error().message == "frame 'arm': no answer");
 }
 
+TEST_CASE("an error keeps what it is about where a place is put before it") {
+  const Error error{Errc::kNotYet, "no data", "hand", "arm", Interval{Time{}, time_of(5)}};
+  const Result<int> result = fail_at("lookup 3", error);
+  REQUIRE_FALSE(result);
+  CHECK(result.error().message == "lookup 3: no data");
+  CHECK(result.error().frame == "hand");
+  CHECK(result.error().partition == "arm");
+  CHECK(result.error().available == error.available);
+}
+
+TEST_CASE("an error that came as a text names the first frame and partition of it") {
+  const auto named = [](const std::string& message) {
+    const Error error = error_of_text(Errc::kTimeout, message);
+    CHECK(error.message == message);
+    return error.frame + "|" + error.partition;
+  };
+  CHECK(named("no frame 'hand' to end at") == "hand|");
+  CHECK(named("frames 'a' and 'b' have no common root") == "a|");
+  CHECK(named("the edge of 'x' has no data; frame 'y'") == "x|");
+  CHECK(named("frame 'y' is below the edge of 'x'") == "y|");
+  CHECK(named("partition 'arm' did not answer") == "|arm");
+  CHECK(named("the subframe 'no' of partition 'p'") == "|p");
+  CHECK(named("(frame 'f')") == "f|");
+  CHECK(named("frame '' and partition 'p' without an end: partition 'q") == "|p");
+  CHECK(named("frame 'without an end") == "|");
+  CHECK(named("") == "|");
+}
+
 TEST_CASE("a value that is not there fails a test with the message of the error") {
   const Result<int> result = fail(Errc::kTimeout, "no answer from partition 'arm'");
   CHECK_THROWS_WITH(result.value(), "no answer from partition 'arm'");

@@ -1,6 +1,6 @@
 // Names that were probably meant.
 
-#include "base/similar.hpp"
+#include "tfdude/base/similar.hpp"
 
 #include <string>
 #include <vector>

@@ -153,6 +153,7 @@ std::vector<Request> random_requests(Random& random) {
                     })});
   add(DescriptionRequest{random_count(random)});
   add(MemoryRequest{});
+  add(TimeRequest{random_stamp(random)});
   return all;
 }
 
