@@ -152,7 +152,7 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
     return one.lacks_sample && (query.at || !one.unsampled);
   });
   if (lacks != edges.end()) {
-    error.frame = lacks->edge->name->text;
+    error.frame = lacks->id;
     error.message = lacks->name() + " has had no sample " +
                     (lacks->unsampled ? "yet" : "since its history was cleared");
     return error;
@@ -181,7 +181,7 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
   } else {
     error.message += "it is no longer kept";
   }
-  error.frame = limiting.edge->name->text;
+  error.frame = limiting.id;
   if (youngest->oldest <= slowest->newest) {
     error.available = Interval{time_of(youngest->oldest), time_of(slowest->newest)};
   }
