@@ -151,17 +151,18 @@ TEST_CASE("a push in several messages is reassembled when all have arrived") {
 }
 
 TEST_CASE("a watch without edges or with a period beyond the maximum is rejected") {
-  CHECK(check_watch({{kArm}, false, kMaxWatchPeriod}));
+  CHECK(check_watch({{kArm}, false, false, kMaxWatchPeriod}));
   CHECK(check_watch({{kArm}}));
-  CHECK(outcome(check_watch({{kArm}, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
-  CHECK(outcome(check_watch({{kArm}, false, std::chrono::nanoseconds::max()})) == "invalid_input");
-  CHECK(outcome(check_watch({{kArm}, false, -1ns})) == "invalid_input");
+  CHECK(outcome(check_watch({{kArm}, false, false, kMaxWatchPeriod + 1ns})) == "invalid_input");
+  CHECK(outcome(check_watch({{kArm}, false, false, std::chrono::nanoseconds::max()})) ==
+        "invalid_input");
+  CHECK(outcome(check_watch({{kArm}, false, false, -1ns})) == "invalid_input");
   CHECK(outcome(check_watch({})) == "invalid_input");
 }
 
 TEST_CASE("at a lower rate only the newest sample is pushed") {
   Arm arm;
-  WatchedGroup group(7, {{kArm}, false, 10ms});
+  WatchedGroup group(7, {{kArm}, false, false, 10ms});
   REQUIRE(group.snapshot(arm.forest, {}));
   for (int t = 1; t < 10; ++t) {
     REQUIRE(arm.forest.update("arm", along_x(t), ms(2 * t)));
@@ -234,7 +235,7 @@ TEST_CASE("a late sample changes composed values also at the stamps of other edg
   REQUIRE(arm.forest.update("hand", along_x(460), ms(46)));
   CHECK(listed(group.next_push(arm.forest)) == "0@45=495 0@46=506 ");
   // Of several samples between two pushes each is sent, unless the watchers want a lower rate.
-  WatchedGroup slow(8, {{{"base", "hand"}}, true, 10ms});
+  WatchedGroup slow(8, {{{"base", "hand"}}, true, false, 10ms});
   REQUIRE(listed(slow.next_push(arm.forest)) == "0@46=506 ");
   for (const int t : {60, 70}) {
     REQUIRE(arm.forest.update({{"arm", along_x(t)}, {"hand", along_x(t)}}, ms(t)));
@@ -293,12 +294,12 @@ TEST_CASE("a group is shared only by equal requests to the same owner") {
       watch_group("arms", 1, {{kHand, kArm}}),
       watch_group("arms", 1, {{{"base", "hand"}}}),
       watch_group("arms", 1, {{{"baseh", "and"}}}),
-      watch_group("arms", 1, {{kArm, kHand}, false, 1ms}),
+      watch_group("arms", 1, {{kArm, kHand}, false, false, 1ms}),
       watch_group("arms", 1, {{kArm, kHand}, true}),
       watch_group("arms", 1, {}),
   };
   CHECK(groups.size() == 9);
-  CHECK(watch_group("arms", 1, {{kArm, kHand}, false, 0ms, ms(5)}) ==
+  CHECK(watch_group("arms", 1, {{kArm, kHand}, false, false, 0ms, ms(5)}) ==
         *groups.find(watch_group("arms", 1, edges)));
 }
 

@@ -23,7 +23,7 @@ struct Observer : Rig {
   explicit Observer(LoopbackNetwork& network) : Rig(network.join()), observations(context) {}
 
   Result<Observed> observe(const Transform& X_AB) {
-    return observations.observe("world", "hand", X_AB, std::nullopt, {}, deadline());
+    return observations.observe({"world", "hand", X_AB, std::nullopt, {}}, deadline());
   }
   Observations observations;
 };

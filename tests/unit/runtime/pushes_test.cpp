@@ -128,7 +128,7 @@ TEST_CASE("pushes: every sample of a watched edge is pushed and nothing of other
 
 TEST_CASE("pushes: a group is pushed no faster than its rate and ends with the newest sample") {
   PushingOwner owner;
-  REQUIRE(owner.pusher.watch(1, {{kHand}, false, 50ms}));
+  REQUIRE(owner.pusher.watch(1, {{kHand}, false, false, 50ms}));
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
   const auto start = std::chrono::steady_clock::now();
   std::int64_t t = 0;
@@ -186,9 +186,9 @@ TEST_CASE("pushes: a watcher that matches late gets all values again") {
 
 TEST_CASE("pushes: a period above the maximum is rejected") {
   PushingOwner owner;
-  CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, std::chrono::nanoseconds::max()})) ==
+  CHECK(outcome(owner.pusher.watch(1, {{kHand}, false, false, std::chrono::nanoseconds::max()})) ==
         "invalid_input");
-  REQUIRE(owner.pusher.watch(1, {{kHand}, false, kMaxWatchPeriod}));
+  REQUIRE(owner.pusher.watch(1, {{kHand}, false, false, kMaxWatchPeriod}));
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
 }
 

@@ -139,7 +139,8 @@ std::vector<Request> random_requests(Random& random) {
   const bool of_edges = random.index(2) == 0;
   add(LookupRequest{random_segments(random, 0), query, random_stamp(random), of_edges,
                     of_edges && random.index(2) == 0});
-  add(WatchRequest{random_segments(random, 1), random.index(2) == 0,
+  const std::size_t watched = random.index(3);
+  add(WatchRequest{random_segments(random, 1), watched == 1, watched == 2,
                    std::chrono::nanoseconds(random.index(1000)), random_stamp(random)});
   add(HistoryRequest{random.index(2) == 0});
   add(random_revision(random));
