@@ -33,8 +33,9 @@ inline void check(const Result<void>& result) {
 }
 
 /// An instant: int [ns], float [s], datetime with a time zone, or an object with `nanoseconds`.
-[[nodiscard]] Time to_time(py::handle time);
-[[nodiscard]] std::optional<Time> to_stamp(py::handle time_or_none);
+/// @param what  its name in messages
+[[nodiscard]] Time to_time(py::handle time, const char* what);
+[[nodiscard]] std::optional<Time> to_stamp(py::handle time_or_none, const char* what);
 /// As an int [ns]; None if absent.
 [[nodiscard]] py::object from_stamp(std::optional<Time> stamp);
 /// datetime in UTC, to microseconds; None if absent.

@@ -72,7 +72,7 @@ void bind_writes(py::class_<Session, std::shared_ptr<Session>>& cls) {
   cls.def(
       "update",
       [](const Session& session, const std::string& id, const Transform& X_PC, py::handle stamp) {
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.update(id, X_PC, time); }));
       },
       py::arg("id"), py::arg("X_PC"), py::arg("stamp") = py::none(),
@@ -100,7 +100,7 @@ void bind_parts(py::class_<Session, std::shared_ptr<Session>>& cls) {
         }
         if (!quaternion.is_none()) update.X_PC.rotation = to_quaternion(quaternion, "quaternion");
         if (!covariance.is_none()) update.X_PC.covariance = to_covariance(covariance);
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.update_partial({update}, time); }));
       },
       py::arg("id"), py::kw_only(), py::arg("translation") = py::none(),
@@ -131,9 +131,11 @@ void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
   cls.def(
       "exists",
       [](const Session& session, const std::string& id) {
-        return session.call([&](Client& c) { return c.exists(id); });
+        return value_of(session.call([&](Client& c) { return c.whether_exists(id); }));
       },
-      py::arg("id"), "Whether a frame with this id is known.");
+      py::arg("id"),
+      "Whether a frame with this id exists. Raises TimeoutException or UnreachableException if\n"
+      "nobody can say.");
   cls.def(
       "now",
       [](const Session& session) {
@@ -143,17 +145,11 @@ void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
   cls.def(
       "wait_until",
       [](const Session& session, py::handle time, py::handle timeout) {
-        const Time until = to_time(time);
-        const Milliseconds wait = to_milliseconds(timeout, "timeout");
-        const auto end = std::chrono::steady_clock::now() + std::min(wait, Milliseconds(1 << 30));
-        while (true) {
-          const auto left = std::chrono::ceil<Milliseconds>(end - std::chrono::steady_clock::now());
-          const auto slice = std::max(std::min(left, kLook), Milliseconds(0));
-          const auto reached = session.call([&](Client& c) { return c.wait_until(until, slice); });
-          if (reached) return;
-          check_interrupted();
-          if (left <= Milliseconds(0)) check(reached);
-        }
+        const Time until = to_time(time, "time");
+        const auto is_timeout = [](const Error& error) { return error.code == Errc::kTimeout; };
+        check(value_after_wait(
+            session, to_milliseconds(timeout, "timeout"),
+            [&](Client& c, Milliseconds wait) { return c.wait_until(until, wait); }, is_timeout));
       },
       py::arg("time"), py::arg("timeout"),
       "Waits until this client's clock has reached a time. Raises TimeoutException after timeout\n"

@@ -57,7 +57,7 @@ Eigen::Matrix3d to_own(py::handle own) {
 CloudQuery to_cloud_query(py::handle at, py::handle stamps, py::handle group,
                           const std::string& fixed, bool covariances, py::handle own) {
   CloudQuery query;
-  query.lookup.at = to_stamp(at);
+  query.lookup.at = to_stamp(at, "at");
   if (!stamps.is_none()) query.stamps = to_instants(stamps);
   query.group = to_duration(group, "group");
   query.fixed = fixed;

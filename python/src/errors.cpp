@@ -6,7 +6,21 @@ namespace tfdude::python {
 py::object exception_of(const Error& error) {
   const UnderWay under_way;
   const py::object make = py::module_::import("tfdude._errors").attr("make");
-  return make(std::string(to_string(error.code)), error.message);
+  // Errors that are none of a lookup have their names in the text only.
+  const Error named = error.frame.empty() && error.partition.empty()
+                          ? error_of_text(error.code, error.message)
+                          : error;
+  const auto or_none = [](const std::string& name) -> py::object {
+    if (name.empty()) return py::none();
+    return py::str(name);
+  };
+  py::object available = py::none();
+  if (error.available) {
+    available =
+        py::make_tuple(nanoseconds(error.available->from), nanoseconds(error.available->until));
+  }
+  return make(std::string(to_string(error.code)), error.message, or_none(named.frame),
+              or_none(named.partition), available);
 }
 
 void raise(const Error& error) {

@@ -4,6 +4,7 @@
 
 #include "bind.hpp"
 #include "client.hpp"
+#include "waiting.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -73,7 +74,7 @@ void bind_observing(ClientClass& cls) {
       "observe",
       [](const Session& session, const std::string& a, const std::string& b, const Transform& X_AB,
          py::handle stamp, double gate, bool independent) {
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         const ObserveOptions options{gate, independent};
         return value_of(
             session.call([&](Client& c) { return c.observe(a, b, X_AB, time, options); }));
@@ -90,7 +91,7 @@ void bind_observing(ClientClass& cls) {
       "fuse",
       [](const Session& session, const std::string& id, const Transform& X_PC, py::handle stamp,
          double gate, bool independent) {
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         const ObserveOptions options{gate, independent};
         return value_of(session.call([&](Client& c) { return c.fuse(id, X_PC, time, options); }));
       },
@@ -105,33 +106,52 @@ void bind_observing(ClientClass& cls) {
       py::arg("partition"), "How well covariances agree with the observations, by edge.");
   cls.def(
       "history",
-      [](const Session& session, const std::string& id) {
-        return value_of(session.call([&](Client& c) { return c.history(id); }));
+      [](const Session& session, const std::string& id, py::handle timeout) {
+        return after_wait(session, timeout,
+                          [&](Client& c, Milliseconds wait) { return c.history(id, wait); });
       },
-      py::arg("id"), "Statistics of an edge's history; empty for a static edge.");
+      py::arg("id"), py::kw_only(), py::arg("timeout") = 0.0,
+      "Statistics of an edge's history; empty for a static edge. timeout [s]: how long to wait "
+      "for\n"
+      "the frame.");
   cls.def(
       "histories",
-      [](const Session& session, const std::string& partition) {
-        return value_of(session.call([&](Client& c) { return c.histories(partition); }));
+      [](const Session& session, const std::string& partition, py::handle timeout) {
+        return after_wait(session, timeout, [&](Client& c, Milliseconds wait) {
+          return c.histories(partition, wait);
+        });
       },
-      py::arg("partition"), "As history(), for the dynamic edges of a partition.");
+      py::arg("partition"), py::kw_only(), py::arg("timeout") = 0.0,
+      "As history(), for the dynamic edges of a partition, which is waited for.");
 }
 
 void bind_clock(ClientClass& cls) {
   cls.def(
       "set_time",
       [](const Session& session, py::handle now) {
-        const Time time = to_time(now);
+        const Time time = to_time(now, "now");
         check(session.call([&](Client& c) { return c.set_time(time); }));
       },
       py::arg("now"), "Sets the external clock of this client.");
   cls.def(
       "publish_clock",
       [](const Session& session, py::handle now) {
-        const Time time = to_time(now);
+        const Time time = to_time(now, "now");
         check(session.call([&](Client& c) { return c.publish_clock(time); }));
       },
       py::arg("now"), "Sends the time to all participants with an external clock.");
+  cls.def(
+      "advance_to",
+      [](const Session& session, py::handle time, py::handle timeout) {
+        const ExternalTime to(to_time(time, "time").time_since_epoch());
+        const auto is_timeout = [](const Error& error) { return error.code == Errc::kTimeout; };
+        check(value_after_wait(
+            session, to_milliseconds(timeout, "timeout"),
+            [&](Client& c, Milliseconds wait) { return c.advance_to(to, wait); }, is_timeout));
+      },
+      py::arg("time"), py::arg("timeout") = 1.0,
+      "As publish_clock(), until the clocks of all owners show the time: for simulations in\n"
+      "lock-step. Raises TimeoutException after timeout [s], naming an owner.");
 }
 
 }  // namespace

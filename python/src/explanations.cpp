@@ -99,7 +99,7 @@ void bind_explanations(py::module_& module, ClientClass& cls) {
       [](const Session& session, const std::string& a, const std::string& b, py::handle at,
          py::handle sensor) {
         WhyQuery query;
-        query.at = to_stamp(at);
+        query.at = to_stamp(at, "at");
         if (!sensor.is_none()) {
           const Doubles stddev = doubles(sensor, {6}, "sensor");
           std::copy_n(stddev.data(), query.sensor.size(), query.sensor.begin());

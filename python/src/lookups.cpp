@@ -11,7 +11,7 @@ namespace {
 /// tf2's users pass 0 for the newest transform.
 Query tf2_query(py::handle time) {
   Query query;
-  query.at = to_stamp(time);
+  query.at = to_stamp(time, "time");
   if (query.at && nanoseconds(*query.at) == 0) query.at.reset();
   return query;
 }
@@ -96,8 +96,8 @@ void bind_own(ClientClass& cls) {
          py::handle at_b, const std::string& fixed, py::handle timeout) {
         Query query_a;
         Query query_b;
-        query_a.at = to_stamp(at_a);
-        query_b.at = to_stamp(at_b);
+        query_a.at = to_stamp(at_a, "at_a");
+        query_b.at = to_stamp(at_b, "at_b");
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
         await_lookup(session, fixed, a, query_a, wait);
         await_lookup(session, fixed, b, query_b, wait);
@@ -114,7 +114,7 @@ void bind_own(ClientClass& cls) {
          py::handle at, py::handle covariance, bool direction, int order,
          py::handle timeout) -> py::object {
         Query query;
-        query.at = to_stamp(at);
+        query.at = to_stamp(at, "at");
         query.order = to_order(order);
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
         if (py::isinstance<Transform>(what)) {
@@ -141,7 +141,7 @@ void bind_own(ClientClass& cls) {
       [](const Session& session, const std::string& a, const std::string& b, py::handle at,
          py::handle over, py::handle timeout) {
         VelocityQuery query;
-        query.at = to_stamp(at);
+        query.at = to_stamp(at, "at");
         query.over = to_duration(over, "over");
         Query middle;
         middle.at = query.at;

@@ -371,7 +371,7 @@ std::vector<Time> to_instants(py::handle at) {
   if (!py::isinstance<py::iterable>(at)) throw py::type_error("instants must be an array of them");
   std::vector<Time> instants;
   for (const py::handle one : py::reinterpret_borrow<py::iterable>(at)) {
-    instants.push_back(to_time(one));
+    instants.push_back(to_time(one, "an instant"));
   }
   return instants;
 }
@@ -379,14 +379,14 @@ std::vector<Time> to_instants(py::handle at) {
 std::vector<std::optional<Time>> to_stamps(py::handle at, bool& many) {
   many = py::isinstance<py::sequence>(at) ||
          (py::isinstance<py::array>(at) && py::reinterpret_borrow<py::array>(at).ndim() > 0);
-  if (!many) return {to_stamp(at)};
+  if (!many) return {to_stamp(at, "at")};
   std::vector<std::optional<Time>> stamps;
   if (const auto instants = of_array(at)) {
     stamps.assign(instants->begin(), instants->end());
     return stamps;
   }
   for (const py::handle one : py::reinterpret_borrow<py::iterable>(at)) {
-    stamps.push_back(to_stamp(one));
+    stamps.push_back(to_stamp(one, "an instant"));
   }
   return stamps;
 }

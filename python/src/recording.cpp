@@ -58,7 +58,7 @@ void bind_questions(RecordingClass& cls) {
       "lookup_at",
       [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,
          py::handle timeout) {
-        const Time time = to_time(at);
+        const Time time = to_time(at, "at");
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
         return value_of(shared.call(
             [&](Recording& recording) { return recording.lookup_at(a, b, time, {}, wait); }));
@@ -86,8 +86,8 @@ void bind_questions(RecordingClass& cls) {
       "lookup_full",
       [](SharedRecording& shared, const std::string& a, py::handle at_a, const std::string& b,
          py::handle at_b, const std::string& fixed) {
-        const Time time_a = to_time(at_a);
-        const Time time_b = to_time(at_b);
+        const Time time_a = to_time(at_a, "at_a");
+        const Time time_b = to_time(at_b, "at_b");
         return value_of(shared.call([&](Recording& recording) {
           return recording.lookup_at(a, time_a, b, time_b, fixed);
         }));
@@ -109,7 +109,9 @@ void bind_questions(RecordingClass& cls) {
       py::arg("id"), "Of an edge in the whole recording; reads the whole file.");
   cls.def(
       "events",
-      [](SharedRecording& shared, py::handle start) { return events_of(shared, to_stamp(start)); },
+      [](SharedRecording& shared, py::handle start) {
+        return events_of(shared, to_stamp(start, "start"));
+      },
       py::arg("start") = py::none(), "All recorded changes from an instant on; reads the file.");
 }
 
@@ -117,7 +119,7 @@ void bind_instant(RecordingClass& cls) {
   cls.def(
       "seek",
       [](SharedRecording& shared, py::handle at) {
-        const Time time = to_time(at);
+        const Time time = to_time(at, "at");
         shared.call([&](Recording& recording) {
           recording.seek(time);
           return true;

@@ -42,26 +42,26 @@ py::object epoch() {
 
 }  // namespace
 
-Time to_time(py::handle time) {
+Time to_time(py::handle time, const char* what) {
+  constexpr const char* kExpected = "int [ns], float [s] or datetime";
   if (PyLong_CheckExact(time.ptr())) return time_of(integer(time));
-  if (PyFloat_Check(time.ptr())) return time_of(nanoseconds_of(time.cast<double>(), "time"));
-  if (PyBool_Check(time.ptr()) || time.is_none()) {
-    wrong_type("time", "int [ns], float [s] or datetime", time);
-  }
+  if (PyFloat_Check(time.ptr())) return time_of(nanoseconds_of(time.cast<double>(), what));
+  if (PyBool_Check(time.ptr()) || time.is_none()) wrong_type(what, kExpected, time);
   if (PyIndex_Check(time.ptr())) return time_of(integer(time));
   if (py::hasattr(time, "nanoseconds")) return time_of(integer(time.attr("nanoseconds")));
   if (py::isinstance(time, py::module_::import("datetime").attr("datetime"))) {
     if (time.attr("tzinfo").is_none()) {
-      throw py::value_error("time: a datetime needs a time zone, such as timezone.utc");
+      throw py::value_error(std::string(what) +
+                            ": a datetime needs a time zone, such as timezone.utc");
     }
     return time_of(of_timedelta(time - epoch()));
   }
-  wrong_type("time", "int [ns], float [s] or datetime", time);
+  wrong_type(what, kExpected, time);
 }
 
-std::optional<Time> to_stamp(py::handle time_or_none) {
+std::optional<Time> to_stamp(py::handle time_or_none, const char* what) {
   if (time_or_none.is_none()) return std::nullopt;
-  return to_time(time_or_none);
+  return to_time(time_or_none, what);
 }
 
 py::object from_stamp(std::optional<Time> stamp) {
@@ -106,15 +106,17 @@ double to_seconds(std::chrono::nanoseconds duration) {
 }
 
 Order to_order(int order) {
-  if (order != 2 && order != 4) throw py::value_error("order must be 2 or 4");
+  if (order != 2 && order != 4) {
+    throw py::value_error("order must be 2 or 4, not " + std::to_string(order));
+  }
   return order == 2 ? Order::kSecond : Order::kFourth;
 }
 
 Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
   Query query;
-  query.at = to_stamp(at);
+  query.at = to_stamp(at, "at");
   query.extrapolate = to_duration(extrapolate, "extrapolate");
-  query.age_noise_until = to_stamp(age_noise_until);
+  query.age_noise_until = to_stamp(age_noise_until, "age_noise_until");
   query.order = to_order(order);
   return query;
 }

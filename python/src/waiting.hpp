@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <string>
+#include <utility>
 
 #include "session.hpp"
 
@@ -17,5 +20,29 @@ namespace tfdude::python {
 void check_interrupted();
 /// How often a wait looks.
 inline constexpr Milliseconds kLook{50};
+
+/// The value of a call that waits, and that a signal ends, too: it is repeated while its error is
+/// one that waiting may help.
+/// @param call  takes a client and how long to wait; returns a Result
+/// @param may_help  takes an error
+template <class Call, class MayHelp>
+auto value_after_wait(const Session& session, Milliseconds wait, Call call, MayHelp may_help) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::min(wait, Milliseconds(1 << 30));
+  while (true) {
+    const auto left = std::chrono::ceil<Milliseconds>(end - Clock::now());
+    const auto slice = std::max(std::min(left, kLook), Milliseconds(0));
+    auto result = session.call([&](Client& client) { return call(client, slice); });
+    if (result || left <= Milliseconds(0) || !may_help(result.error())) return result;
+    check_interrupted();
+  }
+}
+
+/// The value of a call that waits for a frame or a partition.
+template <class Call>
+auto after_wait(const Session& session, py::handle timeout, Call call) {
+  return value_of(value_after_wait(session, to_milliseconds(timeout, "timeout"), call,
+                                   [](const Error& error) { return is_unknown(error.code); }));
+}
 
 }  // namespace tfdude::python

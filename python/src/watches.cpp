@@ -161,13 +161,19 @@ void bind_edges(py::module_& module, ClientClass& client) {
   bind_common(cls);
   client.def(
       "watch_edges",
-      [](const Session& session, const std::vector<std::string>& ids, double rate,
-         py::handle span) {
+      [](const Session& session, const std::vector<std::string>& ids, double rate, py::handle span,
+         py::handle timeout) {
         const WatchOptions options = options_of(rate, false, span);
-        return made(session, session.call([&](Client& c) { return c.watch_edges(ids, options); }));
+        return made(session, Result<EdgesWatch>(
+                                 after_wait(session, timeout, [&](Client& c, Milliseconds wait) {
+                                   return c.watch_edges(ids, options, wait);
+                                 })));
       },
       py::arg("ids"), py::kw_only(), py::arg("rate") = 0.0, py::arg("span") = py::none(),
-      "As watch(), for the edges of these frames, wherever they are.");
+      py::arg("timeout") = 0.0,
+      "As watch(), for the edges of these frames, wherever they are. timeout [s]: how long to "
+      "wait\n"
+      "for the frames.");
 }
 
 }  // namespace

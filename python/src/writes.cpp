@@ -6,6 +6,7 @@
 #include "batches.hpp"
 #include "bind.hpp"
 #include "client.hpp"
+#include "waiting.hpp"
 
 // Values of many edges or joints: in one call, and by streams that are opened once.
 namespace tfdude::python {
@@ -64,7 +65,7 @@ using Joints = Streaming<JointStream>;
 py::list publish_edges(Edges& edges, py::handle poses, py::handle covariances, py::handle stamp) {
   check_usable();
   const std::vector<Transform> X = to_transforms(poses, covariances, edges.names.size());
-  return not_sent(edges.stream.try_publish(X, to_stamp(stamp)), edges.names);
+  return not_sent(edges.stream.try_publish(X, to_stamp(stamp, "stamp")), edges.names);
 }
 
 py::list publish_joints(Joints& joints, py::handle positions, py::handle variances,
@@ -74,7 +75,7 @@ py::list publish_joints(Joints& joints, py::handle positions, py::handle varianc
   if (positions.is_none()) throw py::type_error("positions must be numbers");
   return not_sent(
       joints.stream.try_publish(numbers(positions, count, "positions"),
-                                numbers(variances, count, "variances"), to_stamp(stamp)),
+                                numbers(variances, count, "variances"), to_stamp(stamp, "stamp")),
       joints.names);
 }
 
@@ -112,7 +113,7 @@ void bind_many(ClientClass& cls) {
       [](const Session& session, const Names& ids, py::handle poses, py::handle covariances,
          py::handle stamp) {
         const std::vector<EdgeUpdate> edges = edges_of(ids, poses, covariances);
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.update(edges, time); }));
       },
       py::arg("ids"), py::arg("poses"), py::arg("covariances") = py::none(),
@@ -125,7 +126,7 @@ void bind_many(ClientClass& cls) {
       [](const Session& session, const Names& ids, py::handle poses, py::handle covariances,
          py::handle stamp) {
         const std::vector<EdgeUpdate> edges = edges_of(ids, poses, covariances);
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.publish(edges, time); }));
       },
       py::arg("ids"), py::arg("poses"), py::arg("covariances") = py::none(),
@@ -138,7 +139,7 @@ void bind_joints(ClientClass& cls) {
       [](const Session& session, const Names& names, py::handle positions, py::handle variances,
          py::handle stamp) {
         std::vector<JointValue> joints = joints_of(names, positions, variances);
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.publish_joints(std::move(joints), time); }));
       },
       py::arg("names"), py::arg("positions"), py::arg("variances") = py::none(),
@@ -151,17 +152,20 @@ void bind_joints(ClientClass& cls) {
       [](const Session& session, const Names& names, py::handle positions, py::handle variances,
          py::handle stamp) {
         std::vector<JointValue> joints = joints_of(names, positions, variances);
-        const std::optional<Time> time = to_stamp(stamp);
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
         check(session.call([&](Client& c) { return c.update_joints(std::move(joints), time); }));
       },
       py::arg("names"), py::arg("positions"), py::arg("variances") = py::none(),
       py::arg("stamp") = py::none(), "As publish_joints(), acknowledged by the owners.");
   cls.def(
       "joints",
-      [](const Session& session, const std::string& partition) {
-        return value_of(session.call([&](Client& c) { return c.joints(partition); }));
+      [](const Session& session, const std::string& partition, py::handle timeout) {
+        return after_wait(session, timeout,
+                          [&](Client& c, Milliseconds wait) { return c.joints(partition, wait); });
       },
-      py::arg("partition"), "The joints of a partition and their positions, sorted by name.");
+      py::arg("partition"), py::kw_only(), py::arg("timeout") = 0.0,
+      "The joints of a partition and their positions, sorted by name. timeout [s]: how long to\n"
+      "wait for the partition.");
   cls.def(
       "flush",
       [](const Session& session, py::handle timeout) {

@@ -263,5 +263,9 @@ def test_texts_do_not_follow_the_locale(tmp_path):
 
 
 def test_errors_can_be_pickled():
-    error = pickle.loads(pickle.dumps(tfdude.LookupException("unknown_frame", "no frame 'a' in partition 'b'")))
-    assert (error.code, error.frame, error.partition) == ("unknown_frame", "a", "b")
+    given = tfdude.ExtrapolationException("not_yet", "no data", frame="a", partition="b", available=(1, 2))
+    error = pickle.loads(pickle.dumps(given))
+    assert (error.code, str(error), error.frame, error.partition) == ("not_yet", "no data", "a", "b")
+    assert error.available == (1, 2)
+    plain = pickle.loads(pickle.dumps(tfdude.LookupException("unknown_frame", "no frame")))
+    assert (plain.frame, plain.partition, plain.available) == (None, None, None)

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-import re
-
 
 class TransformException(Exception):
     """The base of all errors of tfdude.
 
     code: what a caller can do about it, such as 'not_yet'; the same names as in JSON of the command line.
-    frame, partition: the first ones that the message names, or None.
+    frame, partition: which it is about, or None.
+    available: of 'not_yet' and 'too_old', from when to when all dynamic edges have data [ns]; None if they have no
+    instant in common, or if another process has answered by a message, whose text says it.
     """
 
-    def __init__(self, code: str, message: str) -> None:
+    def __init__(
+        self,
+        code: str,
+        message: str,
+        frame: str | None = None,
+        partition: str | None = None,
+        available: tuple[int, int] | None = None,
+    ) -> None:
         super().__init__(message)
         self.code = code
-        self.frame = _named("(?:frames?|edge of)", message)
-        self.partition = _named("partition", message)
+        self.frame = frame
+        self.partition = partition
+        self.available = available
 
-    def __reduce__(self) -> tuple[type[TransformException], tuple[str, str]]:
-        return type(self), (self.code, str(self))
+    def __reduce__(
+        self,
+    ) -> tuple[type[TransformException], tuple[str, str, str | None, str | None, tuple[int, int] | None]]:
+        return type(self), (self.code, str(self), self.frame, self.partition, self.available)
 
 
 class LookupException(TransformException, LookupError):
@@ -67,11 +77,12 @@ _BY_CODE: dict[str, type[TransformException]] = {
 }
 
 
-def _named(what: str, message: str) -> str | None:
-    match = re.search(rf"\b{what} '([^']*)'", message)
-    return match[1] if match else None
-
-
-def make(code: str, message: str) -> TransformException:
+def make(
+    code: str,
+    message: str,
+    frame: str | None = None,
+    partition: str | None = None,
+    available: tuple[int, int] | None = None,
+) -> TransformException:
     """The exception for an error of the library."""
-    return _BY_CODE.get(code, TransformException)(code, message)
+    return _BY_CODE.get(code, TransformException)(code, message, frame, partition, available)
