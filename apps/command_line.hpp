@@ -7,9 +7,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "exit_status.hpp"
 #include "manual.hpp"
 #include "numbers.hpp"
+#include "usage.hpp"
 
 namespace tfdude::cli {
 
@@ -28,7 +28,7 @@ namespace tfdude::cli {
     app.parse(arguments_of(argc, argv));
     check();
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
+    return end_parsing(app, error);
   }
   return std::nullopt;
 }

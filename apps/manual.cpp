@@ -7,6 +7,8 @@
 
 #include "tfdude/types/version.hpp"
 
+#include "usage.hpp"
+
 namespace tfdude::cli {
 namespace {
 
@@ -168,7 +170,7 @@ class Pages : private CLI::Formatter {
 }  // namespace
 
 void add_manual(CLI::App& app, std::vector<ManualSection> more) {
-  const std::string name = app.get_description().substr(0, app.get_description().find(':'));
+  const std::string name = program_name(app);
   app.add_option_function<std::string>("--manual",
                                        [&app, name, more = std::move(more)](const std::string& to) {
                                          Pages(app, name, to, more).write();

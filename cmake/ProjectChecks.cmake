@@ -62,6 +62,10 @@ add_test(NAME "readme: its lines and programs work"
   COMMAND ${CMAKE_COMMAND} -E env CXX=${CMAKE_CXX_COMPILER}
     $<TARGET_FILE:Python3::Interpreter> ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py ${CMAKE_BINARY_DIR})
 set_tests_properties("readme: its lines and programs work" PROPERTIES LABELS integration TIMEOUT 600)
+add_test(NAME "tutorial: its lines and programs work"
+  COMMAND ${CMAKE_COMMAND} -E env CXX=${CMAKE_CXX_COMPILER}
+    $<TARGET_FILE:Python3::Interpreter> ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py ${CMAKE_BINARY_DIR} --tutorial)
+set_tests_properties("tutorial: its lines and programs work" PROPERTIES LABELS integration TIMEOUT 600)
 add_test(NAME "readme: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/readme/type_blocks.py --self-test)
 set_tests_properties("readme: the check itself" PROPERTIES LABELS unit TIMEOUT 60)

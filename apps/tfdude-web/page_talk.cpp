@@ -45,6 +45,8 @@ class PageTalk final : public Talk {
       past_ = past->at;
       past_due_ = true;  // with the next picture, however many of these come until then
       ask();
+    } else if (std::holds_alternative<WhyRequest>(*request)) {
+      explain();
     } else {
       past_.reset();
       past_due_ = false;
@@ -151,6 +153,24 @@ class PageTalk final : public Talk {
     if (!posted) *asking_ = false;
   }
 
+  // Asks the owners why the pair is as it is, unless they are asked already.
+  void explain() {
+    if (!pair_ || *explaining_) return;
+    *explaining_ = true;
+    const bool posted =
+        live_.worker().post([this, &live = live_, pair = pair_, past = past_,
+                             alive = std::weak_ptr<bool>(explaining_), post = post_] {
+          const Text text = live.pairs().explained(pair->a(), pair->b(), past);
+          post([this, pair, alive, text] {
+            const auto explaining = alive.lock();
+            if (!explaining) return;
+            *explaining = false;
+            if (pair_ == pair) send(text);
+          });
+        });
+    if (!posted) *explaining_ = false;
+  }
+
   Live& live_;
   Post post_;
   Link* link_ = nullptr;
@@ -168,6 +188,7 @@ class PageTalk final : public Talk {
   bool past_due_ = false;  // its picture was not sent yet
   // Also says whether this object exists, to answers that come later.
   std::shared_ptr<bool> asking_ = std::make_shared<bool>(false);
+  std::shared_ptr<bool> explaining_ = std::make_shared<bool>(false);
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "../rendering/explanation.hpp"
 #include "../rendering/json.hpp"
 
 namespace tfdude::web {
@@ -97,6 +98,15 @@ Text Pairs::answer_at(const std::string& a, const std::string& b, Time instant) 
   Query query;
   query.at = instant;
   return text_of(a, b, client_.lookup(a, b, query), true, {});
+}
+
+Text Pairs::explained(const std::string& a, const std::string& b,
+                      const std::optional<Time>& instant) const {
+  WhyQuery query;
+  query.at = instant;
+  nlohmann::json json = cli::why_json(a, b, client_.why(a, b, query));
+  json["op"] = "why";
+  return std::make_shared<const std::string>(cli::dump(json));
 }
 
 Text Pairs::text_of(const std::string& a, const std::string& b,

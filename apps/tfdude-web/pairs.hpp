@@ -61,6 +61,9 @@ class Pairs {
 
   /// The answer for an instant. Waits for the owners.
   [[nodiscard]] Text answer_at(const std::string& a, const std::string& b, Time instant) const;
+  /// Why the answer is as it is, or why there is none; absent: now. Waits for the owners.
+  [[nodiscard]] Text explained(const std::string& a, const std::string& b,
+                               const std::optional<Time>& instant) const;
 
  private:
   void renew(Pair& pair);

@@ -34,6 +34,7 @@ std::optional<PageRequest> parse_request(std::string_view text) {
   if (!json.is_object()) return std::nullopt;
   const auto op = text_of(json, "op");
   if (op == "live") return LiveRequest{};
+  if (op == "why") return WhyRequest{};
   if (op == "pair") {
     const auto a = text_of(json, "a");
     const auto b = text_of(json, "b");

@@ -16,6 +16,8 @@ struct PairRequest {
   std::string a;
   std::string b;
 };
+/// Explain the pair that is followed, at the instant that is shown.
+struct WhyRequest {};
 /// Show an instant.
 struct PastRequest {
   Time at;
@@ -23,7 +25,7 @@ struct PastRequest {
 /// Show what is new.
 struct LiveRequest {};
 
-using PageRequest = std::variant<PairRequest, PastRequest, LiveRequest>;
+using PageRequest = std::variant<PairRequest, PastRequest, LiveRequest, WhyRequest>;
 
 /// Reads a message of a page. @return nothing if it is malformed
 [[nodiscard]] std::optional<PageRequest> parse_request(std::string_view text);

@@ -26,6 +26,9 @@ int report(const Error& error, const Common& common);
 int report_cause(Source source, const Error& error, const Common& common);
 /// Why a request failed: with an unknown frame, it may be that no partition answers.
 [[nodiscard]] Error cause_of(Source source, const Error& error, const Common& common);
+/// The same with what was probably meant: a name that is nearly the one that nobody has, the frame
+/// that a joint moves, or no instant instead of 0. May ask others.
+[[nodiscard]] Error with_hint(Source source, Error error, const Common& common);
 /// An answer in which nothing was found counts as an error if there is no partition. It is printed.
 [[nodiscard]] int check_partitions(Source source, const Common& common, bool found);
 

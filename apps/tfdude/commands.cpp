@@ -17,8 +17,8 @@ AddCommand add_add, add_children, add_correlate, add_description, add_doctor, ad
 Commands::Commands(CLI::App& app) : app_(app) {
   const std::pair<const char*, std::vector<AddCommand*>> groups[] = {
       {"Ask",
-       {add_tree, add_frames, add_partitions, add_roots, add_parent, add_children, add_exists,
-        add_lookup, add_why, add_velocity, add_point, add_joints, add_description}},
+       {add_lookup, add_why, add_velocity, add_point, add_tree, add_frames, add_partitions,
+        add_roots, add_parent, add_children, add_exists, add_joints, add_description}},
       {"Change",
        {add_add, add_update, add_move, add_remove, add_forget, add_observe, add_fuse, add_correlate,
         add_joint, add_publish, add_import}},

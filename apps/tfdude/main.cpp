@@ -8,7 +8,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 #include "tfdude/types/version.hpp"
 
@@ -17,6 +16,7 @@
 #include "../numbers.hpp"
 #include "../rendering/terminal.hpp"
 #include "../stop_signals.hpp"
+#include "../usage.hpp"
 #include "answer.hpp"
 #include "commands.hpp"
 #include "complete.hpp"
@@ -39,21 +39,6 @@ void add_common_options(CLI::App& app, Common& common) {
       "angles in degrees instead of radians, typed and printed; answers in JSON have radians");
 }
 
-// Prints what is wrong with the command line, or help. @return the exit status
-int end_parsing(const CLI::App& app, const CLI::ParseError& error, char** argv, int argc) {
-  if (error.get_exit_code() == 0) return app.exit(error);
-  const auto unknown = app.remaining();
-  const bool no_command = app.get_subcommands().empty() && !unknown.empty();
-  const std::string what = no_command ? "no command " + quote(unknown.front()) : error.what();
-  // Looks for --json itself: CLI11 does not fill `common` from a wrong command line.
-  if (std::find(argv, argv + argc, std::string_view("--json")) != argv + argc) {
-    return cli::report_usage(what);
-  }
-  if (no_command) std::fprintf(stderr, "tfdude: %s\n", what.c_str());
-  (void)app.exit(error);
-  return cli::kWrongUsage;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -66,6 +51,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", version_line());
   app.require_subcommand(1);
   app.fallthrough();
+  cli::show_commands_first(app);
   add_common_options(app, common);
   const cli::Commands commands(app);
   cli::require_numbers(app);
@@ -77,7 +63,10 @@ int main(int argc, char** argv) {
     app.name(argv[0]);
     app.parse(cli::arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {
-    return end_parsing(app, error, argv, argc);
+    // Looks for --json itself: CLI11 does not fill `common` from a wrong command line.
+    const bool json = std::find(argv, argv + argc, std::string_view("--json")) != argv + argc;
+    if (json && error.get_exit_code() != 0) return cli::report_usage(cli::usage_error(app, error));
+    return cli::end_parsing(app, error);
   }
   // Discovery by a server takes most of the default timeout of a second.
   const bool by_server = !common.options.discovery_server.empty();

@@ -90,7 +90,7 @@ int follow(Client& client, const Common& common, const Path& path, const WatchOp
   const auto complain = [&](const Error& error) {
     const bool again =
         reported && reported->code == error.code && reported->message == error.message;
-    if (!again) (void)report(error, common);
+    if (!again) (void)report(with_hint(client, error, common), common);
     reported = error;
   };
   do {

@@ -131,6 +131,7 @@ TEST_CASE("cli: queries are answered as JSON") {
   const json error = parse_line(refused).at("error");
   CHECK(error.at("code") == "unknown_end");
   CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring("'nowhere'"));
+  CHECK(error.at("frame") == "nowhere");
 }
 
 TEST_CASE("cli: changes are made and confirmed") {
@@ -239,6 +240,64 @@ TEST_CASE("cli: every command has help with an example") {
     CHECK(help.err.empty());
     CHECK_THAT(help.out, ContainsSubstring("Example: tfdude ") && ContainsSubstring(command));
   }
+}
+
+TEST_CASE("cli: help lists lookup first, and the options of all commands last") {
+  const testing::TestDomain domain;
+  const std::string help = domain.cli({"--help"}).out;
+  CHECK(commands_of(help).front() == "lookup");
+  const std::vector<std::string> groups = {"Ask",  "Change", "Watch",           "Record",
+                                           "Draw", "Keys",   "Look for faults", "Options"};
+  std::size_t at = 0;
+  for (const std::string& group : groups) {
+    INFO(group);
+    at = help.find("\n" + group + ":", at);
+    REQUIRE(at != std::string::npos);
+  }
+}
+
+TEST_CASE("cli: every command says what it does not have") {
+  const testing::TestDomain domain;
+  for (const std::string& command : commands_of(domain.cli({"--help"}).out)) {
+    const CliResult wrong = domain.cli({command, "--no-such-option"});
+    // The command that is a program of its own passes its arguments on.
+    const std::string name = command == "web" ? "tfdude-web" : "tfdude";
+    const std::string whose = command == "web" ? "tfdude-web" : command;
+    INFO(wrong.err);
+    CHECK(wrong.status == 2);
+    CHECK(wrong.err.rfind(name + ": " + whose + " has no --no-such-option", 0) == 0);
+    CHECK_THAT(wrong.err, ContainsSubstring(" --help shows what is possible"));
+  }
+}
+
+TEST_CASE("cli: an unknown frame is answered with the nearest name") {
+  const ThesisDaemons d;
+  for (const Arguments& command : std::vector<Arguments>{{"lookup", "world", "hand_lef"},
+                                                         {"lookup", "hand_lef", "world"},
+                                                         {"update", "hand_lef"},
+                                                         {"history", "hand_lef"},
+                                                         {"parent", "hand_lef"}}) {
+    const CliResult result = d.domain.cli(command);
+    INFO(command[0] << ": " << result.err);
+    CHECK(result.status == 1);
+    CHECK_THAT(result.err, ContainsSubstring("no frame 'hand_lef'") &&
+                               ContainsSubstring("did you mean hand_left?"));
+  }
+  CHECK_THAT(d.domain.cli({"parent", "zzzz"}).err, !ContainsSubstring("mean"));
+}
+
+TEST_CASE("cli: who asks for the instant 0 is told how to ask for the newest") {
+  const ThesisDaemons d;
+  CHECK(text(d, {"update", "arm_1", "--xyz", "1", "0", "0", "--stamp", "-1"}) == "updated arm_1\n");
+  const std::string hint = "leave --at out for the newest";
+  for (const std::string at : {"--at=0", "--at=0.0"}) {
+    const CliResult zero = d.domain.cli({"lookup", "world", "arm_1", at});
+    INFO(zero.err);
+    CHECK(zero.status == 1);
+    CHECK_THAT(zero.err, ContainsSubstring(hint));
+  }
+  CHECK_THAT(d.domain.cli({"lookup", "world", "arm_1", "--at", "0"}).err, ContainsSubstring(hint));
+  CHECK_THAT(d.domain.cli({"lookup", "world", "arm_1", "--at", "1"}).err, !ContainsSubstring(hint));
 }
 
 }  // namespace tfdude

@@ -105,6 +105,15 @@ TEST_CASE("joints: wrong input is rejected by name and changes nothing") {
   CHECK_FALSE(robot.joint("elbow_joint").at("measured").get<bool>());
 }
 
+TEST_CASE("joints: who asks for a joint as for a frame is told which frame it moves") {
+  const Robot robot;
+  for (const Arguments& command :
+       std::vector<Arguments>{{"history", "elbow_joint"}, {"lookup", "world", "elbow_joint"}}) {
+    CHECK_THAT(robot.refused(command),
+               ContainsSubstring("'elbow_joint' is a joint, which moves frame 'forearm_link'"));
+  }
+}
+
 TEST_CASE("joints: positions outside the limits are counted or with strict limits rejected") {
   SECTION("applied") {
     const Robot robot;

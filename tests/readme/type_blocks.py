@@ -1,11 +1,13 @@
 """Types the commands of README.md and docs/install.md into a shell, line by line, in a fresh clone of this checkout.
 
     type_blocks.py BUILD_DIR
+    type_blocks.py BUILD_DIR --tutorial
     type_blocks.py --self-test
 
 The clone's build/release is a link to BUILD_DIR, and `cmake --preset` does nothing, so that nothing is built again.
 README.md is typed twice, because a user may run its tour twice. Its C++ program is built against the installed package,
-as docs/install.md says. All runs in a DDS domain and an empty home directory of its own.
+as docs/install.md says. --tutorial types docs/tutorial.md instead, whose files must be those of examples/tutorial. All
+runs in a DDS domain and an empty home directory of its own.
 """
 import fcntl
 import os
@@ -60,7 +62,9 @@ class Shell:
         """Returns the output of the line and of background jobs, and the status."""
         os.write(self.terminal, f"{line}\n".encode())
         if "# until Ctrl-C" in line:
-            self.read(time.monotonic() + 3)
+            deadline = time.monotonic() + 3
+            while self.read(deadline) and "after some seconds" in line:
+                pass
             os.write(self.terminal, b"\x03")
         return self.read_until_prompt(line)
 
@@ -103,8 +107,8 @@ class Shell:
 
 
 def check_width(line, printed):
-    """What a person reads fits the terminal."""
-    if not line.startswith("tfdude ") or "--json" in line or "# until Ctrl-C" in line:
+    """What a person reads fits the terminal, but for errors, which are one line."""
+    if not line.startswith("tfdude ") or any(mark in line for mark in ("--json", "# until Ctrl-C", "|| true")):
         return
     for printed_line in printed.splitlines():
         from_background = printed_line.startswith("[")  # a daemon's log, or bash about a job
@@ -158,10 +162,10 @@ esac
     wrapper.chmod(0o755)
 
 
-def try_pages(build, work, domain):
-    home, checkout, project = work / "home", work / "tf-dude", work / "project"
-    for folder in (home, project):
-        folder.mkdir()
+def prepare(build, work, domain):
+    """A clone with its build folder, and the environment of a new user."""
+    home, checkout = work / "home", work / "tf-dude"
+    home.mkdir()
     (home / ".gitconfig").write_text("[safe]\n\tdirectory = *\n")  # the checkout may belong to another user
     put_in_front_of_cmake(work / "bin")
     environment = {**os.environ, "HOME": str(home), "TFDUDE_DOMAIN": str(domain), "TERM": "xterm",
@@ -169,7 +173,25 @@ def try_pages(build, work, domain):
     clone(checkout, environment)
     (checkout / "build").mkdir()
     (checkout / "build/release").symlink_to(build)
+    return checkout, environment
 
+
+def try_tutorial(build, work, domain):
+    checkout, environment = prepare(build, work, domain)
+    page = (checkout / "docs/tutorial.md").read_text()
+    shown = re.findall(r"^`([^`\n]+)`:\n\n```\w+\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    files = {file.name: file.read_text() for file in (checkout / "examples/tutorial").iterdir()}
+    if dict(shown) != files:
+        wrong = [name for name in {*files, *dict(shown)} if dict(shown).get(name) != files.get(name)]
+        raise SystemExit(f"docs/tutorial.md does not show these files of examples/tutorial as they are: {wrong}")
+    transcript = type_all(blocks(page, "sh"), checkout, environment)
+    check_samples(blocks(page, "text"), transcript)
+
+
+def try_pages(build, work, domain):
+    checkout, environment = prepare(build, work, domain)
+    project = work / "project"
+    project.mkdir()
     readme = (checkout / "README.md").read_text()
     install = (checkout / "docs/install.md").read_text()
     (program,) = blocks(readme, "cpp")
@@ -220,7 +242,8 @@ def main():
             self_test(Path(work))
         else:
             domain, _lease = lease_domain()
-            try_pages(Path(sys.argv[1]).resolve(), Path(work), domain)
+            try_it = try_tutorial if sys.argv[2:] == ["--tutorial"] else try_pages
+            try_it(Path(sys.argv[1]).resolve(), Path(work), domain)
 
 
 if __name__ == "__main__":

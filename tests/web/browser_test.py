@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """The page in a real browser. Needs Debian's chromium, chromium-driver and python3-selenium. Keeps a screenshot."""
 
+import math
 import os
 import pathlib
+import re
 import shutil
 import signal
 import time
@@ -73,6 +75,9 @@ class Browser(unittest.TestCase):
             self.assert_same_pose(browser.execute_script(POSE, frame), said, 1e-4)
         self.choose_two(robot, browser)
         self.drag(robot, browser)
+        # Later: the server then reads the memory of the owners, and the last digits of its answers may be others.
+        self.explain(robot, browser)
+        self.refit(robot, browser)
         robot.arm.send_signal(signal.SIGKILL)
         rig.eventually(lambda: browser.execute_script(
             "const {model} = tfdude; return !model.isReachable(model.index.get('tool0'))"), "an owner that died")
@@ -135,6 +140,35 @@ class Browser(unittest.TestCase):
         for i, variance in enumerate(diagonal):
             self.assertAlmostEqual(variance, rows[i][i], delta=1e-3 * rows[i][i] + 1e-12)
         browser.execute_script("tfdude.seeFrom('world')")
+
+    def explain(self, robot, browser):
+        browser.execute_script("document.getElementById('ask-why').click()")
+        text = "return document.getElementById('why').innerText"
+        why = robot.ask("why", "world", "tool0")
+        rig.eventually(lambda: "the least certain" in browser.execute_script(text), "an explanation")
+        shown = browser.execute_script(text)
+        for name in [one["name"] for one in why["edges"][:3]] + [why["best"]["to"]]:
+            self.assertIn(name, shown)
+        (x, y, z), distance = browser.execute_script(
+            "const {inspector} = tfdude, {answer} = inspector; return [answer.translation, inspector.distance(answer)]")
+        number, unit = re.match(r"Distance (\S+) (m|mm) ± ", distance).groups()
+        metres = float(number) * {"m": 1, "mm": 1e-3}[unit]
+        self.assertAlmostEqual(metres, math.hypot(x, y, z), delta=0.005 * metres)
+        self.assertEqual(browser.execute_script("return tfdude.inspector.b.title"), "tool0")
+
+    def refit(self, robot, browser):
+        """What comes later is shown, unless the user has turned the view."""
+        outside = "return tfdude.scene.isOutside()"
+        browser.execute_script("tfdude.scene.fit()")
+        self.assertFalse(browser.execute_script(outside))
+        robot.ask("add", "beacon", "--parent", "world", "--xyz", "30", "0", "0")
+        rig.eventually(lambda: browser.execute_script("return tfdude.model.index.has('beacon')"), "a new frame")
+        rig.eventually(lambda: not browser.execute_script(outside), "a view with the new frame")
+        browser.execute_script("tfdude.scene.turned = true")
+        robot.ask("update", "beacon", "--xyz", "300", "0", "0")
+        wanted = "return document.getElementById('fit').classList.contains('wanted')"
+        rig.eventually(lambda: browser.execute_script(wanted), "a button that says that something lies outside")
+        robot.ask("remove", "beacon")
 
     def joints_move(self, browser):
         position = "return tfdude.model.joints[0].position"

@@ -95,6 +95,7 @@ TEST_CASE("web: a token is taken from the address or from the cookie") {
 
 TEST_CASE("web: requests of pages are checked") {
   CHECK(std::holds_alternative<LiveRequest>(parse_request(R"({"op":"live"})").value()));
+  CHECK(std::holds_alternative<WhyRequest>(parse_request(R"({"op":"why"})").value()));
   const auto pair = parse_request(R"({"op":"pair","a":"world","b":"hand"})");
   REQUIRE(pair);
   CHECK(std::get<PairRequest>(*pair).b == "hand");

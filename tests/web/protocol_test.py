@@ -168,6 +168,23 @@ class Protocol(rig.RigTest):
             self.assertTrue(close(answer[one], said[one], 1e-12), one)
         self.assertEqual([one["partition"] for one in answer["path"]], ["base", "arm"])
 
+    def test_why_is_what_the_command_line_says(self):
+        async def ask(a, b):
+            async with connect(self.robot) as socket:
+                page = Page(socket)
+                await page.send(op="pair", a=a, b=b)
+                await page.until(lambda p: "pair" in p.last)
+                await page.send(op="why")
+                await page.until(lambda p: "why" in p.last)
+                return page.last["why"]
+        answer, said = self.run_async(ask("lidar", "tool0")), self.robot.ask("why", "lidar", "tool0")
+        for key in ("from", "to", "cause", "is_rotation", "assumed_joints", "unspecified"):
+            self.assertEqual(answer[key], said[key], key)
+        for kind in ("edges", "joints"):
+            self.assertEqual([one["name"] for one in answer[kind]], [one["name"] for one in said[kind]])
+        cause = self.run_async(ask("world", "tool"))["cause"]
+        self.assertEqual((cause["obstacle"], cause["frame"], cause["similar"][0]), ("unknown_frame", "tool", "tool0"))
+
     def test_an_impossible_pair_says_why(self):
         async def ask():
             async with connect(self.robot) as socket:

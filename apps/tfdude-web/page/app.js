@@ -21,7 +21,7 @@ const model = new Model();
 const scene = new Scene(by('scene'), model);
 const labels = new Labels(by('labels'), scene);
 const tree = new Tree(model, { choose });
-const inspector = new Inspector(model, { ends: setEnds });
+const inspector = new Inspector(model, { ends: setEnds, why: () => connection.send({ op: 'why' }) });
 const timeline = new Timeline(model, { ask: (request) => connection.send(request) });
 const costs = [];            // what the script took for each of the last pictures, without drawing [ms]
 let waiting = 0;             // the same, for messages since the last picture
@@ -35,6 +35,7 @@ const connection = new Connection({
       hello: () => { by('link').title = message.version; },
       structure: () => takeStructure(message),
       pair: () => takePair(message),
+      why: () => inspector.takeWhy(message),
       status: () => takeStatus(message),
       joints: () => {
         drawJoints(model.joints = message.joints);
@@ -186,6 +187,7 @@ function picture(time) {
   if (drawn) labels.draw();
   if (time > behindText) {
     behindText = time + 500;
+    keepInView();
     tree.draw();
     inspector.draw();
     timeline.draw();
@@ -200,6 +202,13 @@ function picture(time) {
     waiting = 0;
   }
   if (costs.length > 2000) costs.splice(0, 1000);
+}
+
+/** Shows all again when something lies outside, unless the user has turned the view: then the button says so. */
+function keepInView() {
+  const outside = fitted && scene.isOutside();
+  if (outside && !scene.turned && !scene.following) later.fit = later.update = true;
+  by('fit').classList.toggle('wanted', outside && scene.turned);
 }
 
 /** How many standard deviations the shapes have. */

@@ -11,12 +11,13 @@ const SHARES = { 1: '19.9 %', 2: '73.9 %', 2.795: '95 %', 3: '97.1 %', 30: 'all'
 const note = (text, kind) => element('p', { class: `note ${kind}` }, text);
 
 export class Inspector {
-  /** @param on  functions: ends(a, b) */
+  /** @param on  functions: ends(a, b), why() */
   constructor(model, on) {
     this.model = model;
     this.on = on;
     this.plot = new Plot();
     this.answer = null;
+    this.why = null;          // the explanation of the pair
     this.k = 3;
     this.box = document.getElementById('inspector');
     const end = (letter) => element('input', {
@@ -28,6 +29,11 @@ export class Inspector {
     this.a = end('a');
     this.b = end('b');
     this.body = element('div', { class: 'block' });
+    // The button stays when the numbers are drawn again, so that a click is not lost.
+    this.ask = element('button', { id: 'ask-why', title: 'Ask the owners what makes this uncertain, or why there is ' +
+      'no answer', onclick: () => this.on.why() }, 'Why?');
+    this.reasonBody = element('div', {});
+    this.reason = element('div', { class: 'block', id: 'why' }, this.ask, this.reasonBody);
     this.more = element('div', { class: 'block' });
     this.canvas = element('canvas', { id: 'plot' });
     this.plotBox = element('div', { class: 'block' }, this.plotTitle = element('h2', {}), this.canvas);
@@ -36,7 +42,8 @@ export class Inspector {
       element('b', { class: 'a' }, 'A'), this.a,
       element('button', { class: 'swap icon', title: 'Swap (X)',
         onclick: () => this.on.ends(this.b.value, this.a.value) }, '⇅'),
-      element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.plotBox, this.more);
+      element('b', { class: 'b' }, 'B'), this.b), this.choices, this.body, this.reason, this.plotBox,
+      this.more);
     this.draw();
   }
 
@@ -48,9 +55,12 @@ export class Inspector {
     if (a !== this.a.value || b !== this.b.value) {
       this.plot.clear();
       this.answer = null;
+      this.why = null;
     }
-    this.a.value = a;
-    this.b.value = b;
+    for (const [input, id] of [[this.a, a], [this.b, b]]) {
+      input.value = id;
+      input.title = id;  // which may be longer than its box
+    }
     this.draw();
   }
 
@@ -63,6 +73,12 @@ export class Inspector {
     if (!answer.stamp_ns) return;
     const t = Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6;
     this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
+  }
+
+  takeWhy(why) {
+    if (why.from !== this.a.value || why.to !== this.b.value) return;
+    this.why = why;
+    this.dirty = true;
   }
 
   /** Beside the numbers: of the position along the axes of A, then of the rotation about the axes of B. */
@@ -96,9 +112,12 @@ export class Inspector {
       more.push(...this.path(answer));
     }
     this.body.replaceChildren(...parts);
+    this.reason.hidden = !this.b.value || !answer;
+    this.reasonBody.replaceChildren(...(this.why ? this.explanation(this.why) : []));
     this.more.replaceChildren(...more);
     if (!this.plotBox.hidden) {
-      this.plotTitle.textContent = `${NAMES[this.plot.component]} in the last 30 s, ±${this.k} σ`;
+      const unit = this.plot.component < 3 ? 'm' : '°';
+      this.plotTitle.textContent = `${NAMES[this.plot.component]} [${unit}] in the last 30 s, ±${this.k} σ`;
       this.plot.k = this.k;
       this.plot.draw(this.canvas);
     }
@@ -125,6 +144,7 @@ export class Inspector {
       const have = joints.length === 1 ? 'joint has' : 'joints have';
       if (joints.length) notes.push(note(`${joints.length} ${have} had no sample: ${joints.join(', ')}.`, 'warn'));
     }
+    notes.push(note(this.distance(answer), ''));
     if (s) notes.push(note('σ of x, y, z is along the axes of A, of the rotation about the axes of B.', ''));
     if (basis.bound) notes.push(note('σ is an upper bound: some correlations are not known.', ''));
     const copy = element('button', { class: 'copy', title: 'Copy as JSON',
@@ -132,6 +152,47 @@ export class Inspector {
     return [element('h2', {}, 'B in A', copy), element('table', { class: 'pose' }, element('tbody', {}, ...rows)),
       element('p', { class: 'note', title: 'x, y, z, w' }, `quaternion ${q.map((c) => fixed(c, 6)).join('  ')}`),
       element('p', { class: 'note' }, this.instant(answer)), ...notes];
+  }
+
+  /** Of the two origins, with the deviation along the line between them. */
+  distance(answer) {
+    const t = answer.translation, d = Math.hypot(...t), rows = answer.covariance || answer.covariance_of_specified;
+    if (!rows || d === 0) return `Distance ${metres(d)}.`;
+    const S = positionCovariance(answer.rotation, rows);
+    let variance = 0;
+    for (let i = 0; i < 3; ++i) for (let j = 0; j < 3; ++j) variance += (t[i] * S[3 * i + j] * t[j]) / (d * d);
+    return `Distance ${metres(d)} ± ${metres(Math.sqrt(Math.max(0, variance)))}.`;
+  }
+
+  /** Why B in A is so uncertain, or why there is no answer: as `tfdude why` says it. */
+  explanation(why) {
+    if (why.cause) {
+      const { obstacle, frame, partition, needs, similar } = why.cause;
+      const where = [frame && `frame ${frame}`, partition && `partition ${partition}`].filter(Boolean).join(' of ');
+      const parts = [note(`${obstacle.replaceAll('_', ' ')}${where ? `: ${where}` : ''}.`, 'bad')];
+      if (needs) parts.push(note(`It needs ${needs}.`, ''));
+      if (similar.length) parts.push(note(`Did you mean ${similar.join(', ')}?`, 'warn'));
+      return parts;
+    }
+    const size = (variance) => (why.is_rotation ? degrees : metres)(Math.sqrt(Math.max(0, variance)));
+    const along = why.direction.map((c) => fixed(c, 2)).join(' ');
+    const parts = [note(`± ${size(why.variance)} ${why.is_rotation ? 'about' : 'along'} ${along}, ` +
+      'where it is the least certain. Of this variance:', '')];
+    for (const [kind, list] of [['', why.edges], ['source ', why.sources], ['joint ', why.joints]]) {
+      const shown = list.slice(0, 6);
+      if (!shown.length) continue;
+      parts.push(element('div', { class: 'bars' }, ...shown.map((one) => element('div', {},
+        element('span', { class: 'name', title: kind + one.name }, kind + one.name),
+        element('span', { class: 'bar', title: size(one.variance) },
+          element('i', { style: `width:${Math.max(0, Math.min(100, 100 * one.share))}%` })),
+        element('span', { class: 'n' }, `${(100 * one.share).toFixed(0)} %`)))));
+    }
+    const { best } = why;
+    if (best) {
+      parts.push(note(`Measuring ${best.to} in ${best.from} would leave ± ${size(best.variance_after)}.`, ''));
+    }
+    if (why.assumed_joints.length) parts.push(note(`Nobody has measured ${why.assumed_joints.join(', ')}.`, 'warn'));
+    return parts;
   }
 
   instant(answer) {
@@ -164,7 +225,8 @@ export class Inspector {
         const owner = model.partitions.findIndex((one) => one.name === segment.partition);
         const gone = owner >= 0 && !model.partitions[owner].reachable;
         const colour = gone ? 'var(--faint)' : this.colours[owner % this.colours.length];
-        return element('li', { style: `--colour:${colour}`, class: gone ? 'gone' : '' },
+        return element('li', { style: `--colour:${colour}`, class: gone ? 'gone' : '',
+          title: `${segment.partition}: ${segment.from} → ${segment.to}` },
           element('b', {}, segment.partition), `  ${segment.from} → ${segment.to}${gone ? ', unreachable' : ''}`);
       })));
     }

@@ -20,7 +20,7 @@ export function drawJoints(joints) {
     const show = joint.type === 'prismatic' ? metres : degrees;
     const stddev = joint.variance === null ? null : Math.sqrt(joint.variance);
     const deviation = stddev === null ? '' : ` ± ${show(stddev)}`;
-    const made = element('div', { class: 'joint', title: `moves ${joint.frame}` }, element('div', {},
+    const made = element('div', { class: 'joint', title: `${joint.name} moves ${joint.frame}` }, element('div', {},
       element('span', { class: 'name' }, joint.name),
       element('span', { class: 'n' }, joint.measured ? `${show(joint.position)}${deviation}`
         : `assumed ${show(joint.position)}`)));

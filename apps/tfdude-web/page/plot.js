@@ -61,6 +61,8 @@ export class Plot {
     g.textAlign = 'center';
     g.textBaseline = 'alphabetic';
     for (const s of [-30, -20, -10, 0]) {
+      const at = Math.round(x(end + s)) + 0.5;
+      g.beginPath(); g.moveTo(at, bottom); g.lineTo(at, bottom + 4); g.stroke();
       g.fillText(s ? `${s} s` : 'now', Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
     }
     g.save();

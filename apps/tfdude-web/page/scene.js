@@ -300,6 +300,18 @@ export class Scene {
     return Math.min(radius / 7, Math.max(0.6 * usual, radius / 60));
   }
 
+  /** Whether a frame lies outside what the last fit() has shown. */
+  isOutside() {
+    const { model, anchor } = this, most = 1.3 * this.radius;
+    for (let i = 0; i < model.count; ++i) {
+      const p = 7 * i + 4, { pose } = model;
+      if (this.isDrawn(i) && Math.hypot(pose[p] - anchor[0], pose[p + 1] - anchor[1], pose[p + 2] - anchor[2]) > most) {
+        return true;
+      }
+    }
+    return false;
+  }
+
   /** Shows all frames. */
   fit() {
     const { model } = this;

@@ -91,7 +91,11 @@ std::string legend(const std::vector<PartitionInfo>& partitions, const Looks& lo
   for (const PartitionInfo& partition : partitions) {
     text += "    " + legend_row(partition, looks.at(partition.name)) + "\n";
   }
-  return text + "  </TABLE>>\n";
+  text +=
+      R"(    <TR><TD COLSPAN="2" ALIGN="LEFT">↳ child of the frame above it, • without children)"
+      R"(<BR ALIGN="LEFT"/>beside them: joint, age of the newest sample, )"
+      R"(± largest standard deviation<BR ALIGN="LEFT"/></TD></TR>)";
+  return text + "\n  </TABLE>>\n";
 }
 
 Colours look_of(const Frame& frame, const Looks& looks) {
@@ -124,6 +128,7 @@ GraphMeasures measures_of(const Graph& graph) {
     return text_width(name_of(frame.id), kNameSize) +
            text_width(detail_of(graph, frame), kDetailSize) + 16;
   };
+  measures.indent = text_width("  ", kNameSize);
   measures.between = 8;
   measures.columns = 24;
   return measures;
@@ -132,9 +137,12 @@ GraphMeasures measures_of(const Graph& graph) {
 // A line of a box: the frame, and what is known of the edge to it.
 std::string row_text(const Graph& graph, const GraphRow& row, std::size_t number,
                      const Colours& look) {
-  const char* before = "";
-  if (row.place == GraphRow::Place::kNext) before = "↳ ";
-  if (row.place == GraphRow::Place::kLeaf) before = "&#160;&#160;• ";
+  std::string before;
+  for (std::size_t level = 1; level < std::min(row.level, kMostIndents); ++level) {
+    before += "&#160;&#160;";
+  }
+  if (row.place == GraphRow::Place::kNext) before += "↳ ";
+  if (row.place == GraphRow::Place::kLeaf) before += "• ";
   const std::string cell = R"(<TD ALIGN="LEFT" BGCOLOR=")" + look.fill + R"(" PORT=")";
   std::string detail = html_text(detail_of(graph, *row.frame));
   if (!detail.empty()) {

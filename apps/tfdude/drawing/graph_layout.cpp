@@ -80,9 +80,12 @@ class Builder {
       (below(*child).empty() ? leaves : inner).push_back(child);
     }
     if (inner.empty() && leaves.size() == 1) std::swap(inner, leaves);
-    for (const Frame* leaf : leaves) box.rows.push_back({leaf, Place::kLeaf});
+    const auto level = static_cast<std::size_t>(
+        std::count_if(box.rows.begin(), box.rows.end(),
+                      [](const GraphRow& row) { return row.place != Place::kLeaf; }));
+    for (const Frame* leaf : leaves) box.rows.push_back({leaf, Place::kLeaf, level});
     if (inner.size() == 1) {
-      box.rows.push_back({inner.front(), Place::kNext});
+      box.rows.push_back({inner.front(), Place::kNext, level});
       return inner.front();
     }
     for (const Frame* child : inner) open_.push_back({child, index, depth});
@@ -111,7 +114,9 @@ Size size_of(const Boxes& boxes, const GraphMeasures& measures) {
     const auto rows = static_cast<double>(box.rows.size() + (box.folded > 0 ? 1 : 0));
     column.height += rows * measures.row_height + measures.between;
     for (const GraphRow& row : box.rows) {
-      column.width = std::max(column.width, measures.row_width(*row.frame));
+      const auto levels = static_cast<double>(std::min(row.level, kMostIndents));
+      column.width =
+          std::max(column.width, measures.row_width(*row.frame) + levels * measures.indent);
     }
   }
   Size size;

@@ -21,6 +21,7 @@ struct GraphRow {
   };
   const Frame* frame;
   Place place = Place::kFirst;
+  std::size_t level = 0;  ///< below the first frame of the box
 };
 
 /// A chain of frames in one column. Leaves beside the chain stand between its frames.
@@ -35,10 +36,14 @@ struct GraphBox {
   [[nodiscard]] const Frame& last() const;
 };
 
+/// Rows that are deeper in a box are indented as those of this level.
+inline constexpr std::size_t kMostIndents = 8;
+
 /// The measures of the picture's texts [pt].
 struct GraphMeasures {
   double row_height = 0;
   std::function<double(const Frame&)> row_width;  ///< of a frame's row
+  double indent = 0;                              ///< of a row for each level below the first one
   double between = 0;                             ///< two boxes of one column
   double columns = 0;                             ///< the distance of two columns
 };

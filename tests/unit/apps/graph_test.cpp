@@ -102,7 +102,8 @@ TEST_CASE("a forest is drawn with its owners and edges and missing parents") {
   CHECK(dot.rfind("digraph frames {\n", 0) == 0);
   // A chain is one box, whose rows have the edges to them.
   CHECK_THAT(row(dot, "arm"), ContainsSubstring(">12 ms  ±3 mm  ±0.007 rad</FONT>"));
-  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">↳ arm</TD>"));
+  CHECK_THAT(row(dot, "base"), ContainsSubstring(">↳ base</TD>"));
+  CHECK_THAT(row(dot, "arm"), ContainsSubstring(">&#160;&#160;↳ arm</TD>"));
   CHECK(line(dot, "\"world\" -> ").empty());
   CHECK(line(dot, "\"gone\" -> ") == "\"gone\" -> \"lost\":in0:w [style=dashed]");
   CHECK_THAT(line(dot, "\"gone\" ["), ContainsSubstring("dashed"));
@@ -112,6 +113,28 @@ TEST_CASE("a forest is drawn with its owners and edges and missing parents") {
   CHECK(arm != fill(row(dot, "base")));
   CHECK(fill(row(dot, "world")) == fill(row(dot, "base")));
   CHECK_THAT(dot, ContainsSubstring("<TR><TD BGCOLOR=\"" + arm + "\""));
+}
+
+TEST_CASE("children are indented below their parents, and a legend says what the signs mean") {
+  Graph graph;
+  graph.frames = {{"base", "odom", "robot", true},  {"cup", "map", "robot", true},
+                  {"hand", "base", "robot", true},  {"lidar", "base", "robot", true},
+                  {"map", "", "robot", false},      {"odom", "map", "robot", true},
+                  {"finger", "hand", "robot", true}};
+  graph.partitions = {partition("robot", true)};
+  const std::string dot = draw_graph(graph);
+  const auto begins = [&](const std::string& id, const std::string& text) {
+    INFO(row(dot, id));
+    CHECK_THAT(row(dot, id), ContainsSubstring("\">" + text + id + "</TD>"));
+  };
+  begins("map", "");
+  begins("cup", "• ");
+  begins("odom", "↳ ");
+  begins("base", "&#160;&#160;↳ ");
+  begins("lidar", "&#160;&#160;&#160;&#160;• ");
+  begins("hand", "&#160;&#160;&#160;&#160;↳ ");
+  CHECK_THAT(dot, ContainsSubstring("↳ child of the frame above it") &&
+                      ContainsSubstring("± largest standard deviation"));
 }
 
 TEST_CASE("an unreachable partition is grey and its arrows are dashed") {

@@ -7,6 +7,7 @@
 
 #include "tfdude/types/explanation.hpp"
 
+// Why an answer is as it is, for people and programs.
 namespace tfdude::cli {
 
 /// An explanation of B in A, one fact a line.
