@@ -129,6 +129,16 @@ void bind_parts(py::class_<Session, std::shared_ptr<Session>>& cls) {
 void bind_structure(py::class_<Session, std::shared_ptr<Session>>& cls) {
   bind_structure_of(cls);
   cls.def(
+      "find_memory",
+      [](const Session& session) {
+        (void)session.call([](Client& c) {
+          c.find_memory();
+          return true;
+        });
+      },
+      "Asks all owners on this computer where their memory is, so that also the first lookups of\n"
+      "their frames read it. Otherwise this is done in the background after the first lookup.");
+  cls.def(
       "exists",
       [](const Session& session, const std::string& id) {
         return value_of(session.call([&](Client& c) { return c.whether_exists(id); }));
@@ -169,6 +179,8 @@ Options to_options(const OpenArguments& arguments) {
     options.discovery = to_milliseconds(arguments.discovery, "discovery");
   }
   options.follow = arguments.follow;
+  // The environment may have switched it off.
+  options.shared_memory = options.shared_memory && arguments.shared_memory;
   if (arguments.clock == "external") {
     options.clock = ClockKind::kExternal;
   } else if (arguments.clock != "system") {
@@ -189,7 +201,10 @@ void bind_client(py::module_& module) {
       "of DDS profiles, or 'local' for this computer only. keys: directory of an identity. "
       "timeout\n"
       "[s]: of each call. discovery [s]: how long a new participant searches for others. follow:\n"
-      "frames to follow instead of all. clock: 'system' or 'external'. network: a LoopbackNetwork\n"
+      "frames to follow instead of all. clock: 'system' or 'external'. shared_memory: whether "
+      "lookups\n"
+      "read the memory of other processes, and others that of this one. network: a "
+      "LoopbackNetwork\n"
       "instead of DDS.\n\n"
       "All calls may be used from any thread; they release the GIL while they wait. Instants are\n"
       "int [ns], float [s] or datetime with a time zone; durations are numbers [s] or timedelta.\n"

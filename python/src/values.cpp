@@ -38,7 +38,17 @@ void bind_stamped(py::module_& module) {
           "Error sources that edges of the path share.")
       .def_property_readonly(
           "bound", [](const StampedTransform& X) { return X.basis.bound; },
-          "Whether the covariance is an upper bound, because a correlation is unknown.");
+          "Whether the covariance is an upper bound, because a correlation is unknown.")
+      .def_property_readonly(
+          "lost",
+          [](const StampedTransform& X) {
+            std::vector<std::pair<std::string, double>> lost;
+            for (const LostOwner& one : X.basis.lost) {
+              lost.emplace_back(one.partition, std::chrono::duration<double>(one.ago).count());
+            }
+            return lost;
+          },
+          "The owners that are gone, and since when [s]: see lookup(last_known=True).");
 }
 
 void bind_velocity(py::module_& module) {

@@ -56,6 +56,47 @@ def test_a_node_in_python_serves_others(domain, hand):
             assert raised.value.partition == "hand"
 
 
+@pytest.fixture
+def arm(domain):
+    frames = [FrameSpec("base"), FrameSpec("tool", "base", Transform.exact((1, 0, 0)))]
+    with tfdude.Node("arm", frames, **domain) as arm:
+        yield arm
+
+
+def info(client, name):
+    return next(p for p in client.partitions() if p.name == name)
+
+
+def test_lookups_in_memory(domain, arm, hand):
+    with tfdude.Client(**domain) as client:
+        client.lookup("base", "hand", timeout=20)
+        client.find_memory()
+        assert info(client, "hand").in_memory and info(client, "arm").in_memory
+        client.update("hand", Transform.exact((0, 0, 5)))
+        X = client.lookup("base", "hand", last_known=True)
+        assert X.translation[2] == 5 and X.lost == []
+    with tfdude.Client(shared_memory=False, **domain) as client:
+        assert client.lookup("base", "hand", timeout=20).translation[2] == 5
+        client.find_memory()
+        assert not info(client, "hand").in_memory
+        assert info(client, "hand").why_not_in_memory == "it is switched off here"
+
+
+def test_last_values(domain, arm, hand):
+    with tfdude.Client(**domain) as client:
+        X = client.lookup("base", "hand", timeout=20)
+        client.find_memory()
+        assert np.array_equal(client.lookup("base", "hand").matrix, X.matrix)
+        hand.kill()
+        assert eventually(lambda: not info(client, "hand").reachable)
+        with pytest.raises(tfdude.UnreachableException):
+            client.lookup("base", "hand")
+        last = client.lookup("base", "hand", last_known=True)
+        assert np.array_equal(last.matrix, X.matrix)
+        [(partition, seconds)] = last.lost
+        assert partition == "hand" and 0 <= seconds < 60
+
+
 def test_taken_partition(domain, hand):
     with pytest.raises(tfdude.TransformException) as raised:
         tfdude.Node("hand", **domain)

@@ -15,7 +15,7 @@ Eigen::Quaterniond normalized(const Eigen::Quaterniond& q) {
 PreparedJoint::PreparedJoint(const Joint& joint, double period)
     : joint_(joint),
       period_(period),
-      exact_origin_(joint.X_PJ.covariance == StatedCovariance::exact()),
+      exact_origin_(joint.X_PJ.covariance == StatedCovariance::exact() ? 1 : 0),
       unit_(joint_transform({Transform::exact({}), joint.S}, 0, 1)
                 .covariance.of_specified()
                 .upper()) {
@@ -46,7 +46,7 @@ Pose PreparedJoint::pose(double position) const {
 }
 
 void PreparedJoint::compute(const JointPosition& at, Transform& X) const {
-  if (!exact_origin_ || std::isnan(at.variance)) {
+  if (exact_origin_ == 0 || std::isnan(at.variance)) {
     X = joint_transform(joint_, at.position, at.stated());
     return;
   }

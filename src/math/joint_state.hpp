@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 
@@ -77,8 +78,8 @@ class PreparedJoint {
   Joint joint_;
   double period_ = 0;
   Kind kind_ = Kind::kScrews;
-  bool exact_origin_ = false;
-  Covariance::Upper unit_{};  // of a variance of one
+  std::uint8_t exact_origin_ = 0;  // a truth value; copies of damaged memory may have any
+  Covariance::Upper unit_{};       // of a variance of one
 };
 
 }  // namespace tfdude

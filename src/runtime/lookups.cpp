@@ -43,6 +43,10 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
   LookupTask task(structure_.forest, structure_.clock.kind(), hints_,
                   {std::string(a), std::string(b), query});
   auto asked = requests_.run(task, deadline);
+  if (!asked && asked.error().code == Errc::kUnreachable && query.last_known &&
+      memory_ != nullptr) {
+    if (auto last = memory_->last_known(std::string(a), std::string(b), query)) return last;
+  }
   if (!asked) return tl::unexpected(std::move(asked.error()));
   if (memory_ != nullptr) memory_->asked(task.parts());
   return std::move(task.X_AB());

@@ -289,6 +289,25 @@ std::optional<Reply> MemoryReads::read(const Request& request) {
   return Reply{request.sequence, 0, *std::move(found)};
 }
 
+Result<StampedTransform> MemoryReads::last_known(const std::string& a, const std::string& b,
+                                                 const Query& query) {
+  auto X_AB = lookup_kept(a, b, query);
+  const auto segments = structure_.forest.segments(a, b);
+  if (!X_AB || !segments) return X_AB;
+  std::set<Owner> named;
+  const Lock lock(structure_.mutex);
+  const Lock owners(mutex_);
+  for (const Segment& segment : *segments) {
+    const auto kept = memories_.find(segment.owner);
+    if (kept == memories_.end() || !kept->second.lost || !named.insert(segment.owner).second) {
+      continue;
+    }
+    X_AB->basis.lost.push_back(
+        {structure_.directory.name(segment.owner), Clock::now() - *kept->second.lost});
+  }
+  return X_AB;
+}
+
 void MemoryReads::wait_for(const std::set<Owner>& owners) {
   MemoryWaits::Owners waited;
   {

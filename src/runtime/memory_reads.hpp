@@ -78,6 +78,9 @@ class MemoryReads {
   }
   /// The reply of an owner to a request for segments, if it can be read.
   [[nodiscard]] std::optional<Reply> read(const Request& request);
+  /// As lookup(); of owners that are gone, the last values. The answer names them.
+  [[nodiscard]] Result<StampedTransform> last_known(const std::string& a, const std::string& b,
+                                                    const Query& query);
   /// Whether there is anything to read.
   [[nodiscard]] bool any() const { return edges_.any() && !member_.out(); }
 
@@ -90,6 +93,13 @@ class MemoryReads {
   [[nodiscard]] Result<StampedTransform> lookup_kept(const std::string& a, const std::string& b,
                                                      const Query& query) {
     return read(a, b, kept_, [&] { return structure_.forest.lookup(a, b, query, kept_); });
+  }
+  /// As Forest::lookup_former(): while the path changes.
+  [[nodiscard]] Result<StampedTransform> lookup_former(const std::string& a, const std::string& b) {
+    const Forest& forest = structure_.forest;
+    auto X_AB = forest.lookup_former(a, b, kept_);
+    if (!X_AB && forest.bind(a, b, kept_, true) > 0) X_AB = forest.lookup_former(a, b, kept_);
+    return X_AB;
   }
   /// As Forest::explain().
   [[nodiscard]] Error explained(Error error, const std::string& a, const std::string& b,

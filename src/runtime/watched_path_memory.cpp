@@ -6,6 +6,14 @@
 
 // Watched paths that are read in the memory of their owners.
 namespace tfdude {
+namespace {
+
+bool is_same(const StampedTransform& X, const StampedTransform& Y) {
+  return X.stamp == Y.stamp && X.pose.translation() == Y.pose.translation() &&
+         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs() && X.covariance == Y.covariance;
+}
+
+}  // namespace
 
 bool WatchedPath::read_memory(Clock::time_point now) {
   bool rerouted = false;
@@ -37,6 +45,7 @@ Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query
   const bool newest = !query.at && !query.age_noise_until && query.order == Order::kSecond;
   // While the path changes its route, or its edges have no instant in common.
   if (newest && why.code != Errc::kNotYet) {
+    if (auto former = memory.lookup_former(a_, b_)) return former;
     if (const auto* held = held_.load(std::memory_order_seq_cst)) return *held;
     const Lock lock(mutex_);
     if (newest_) return *newest_;
@@ -53,11 +62,21 @@ Watched::Looked WatchedPath::look(Clock::time_point now) {
     if (memory == nullptr) return {};
     const auto written = memory->written(a_, b_);
     const Lock lock(mutex_);
-    if (!written || written == written_ || !in_memory()) return {};
+    if (!in_memory()) return {};
+    if (!written) {
+      // Before it is overwritten.
+      if (auto former = memory->lookup_former(a_, b_)) remember(std::move(former));
+      return {};
+    }
+    if (written == written_) return {};
     if (now < tell_from_) return {false, tell_from_};
     if (options_.rate > 0) tell_from_ = now + watch_period(options_.rate);
-    written_ = written;
-    remember(memory->lookup_kept(a_, b_, {}));
+    const bool begins = !std::exchange(written_, written);
+    auto newest = memory->lookup_kept(a_, b_, {});
+    // What a mirror has shown before is not new.
+    const bool known = begins && newest && newest_ && is_same(*newest, *newest_);
+    remember(std::move(newest));
+    if (known) return {};
     messages_.fetch_add(1, std::memory_order_relaxed);
   }
   tell();

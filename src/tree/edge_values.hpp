@@ -13,7 +13,7 @@
 #include "tree/revised_sample.hpp"
 
 // The value of one edge at an instant, for a walk along a path. The edge is one that is held here
-// (OwnEdge), or in the memory of another process (RemoteEdge).
+// (OwnEdge), or in the memory of another process (RemoteEdge), where stamps may be any numbers.
 namespace tfdude {
 
 // The type of an edge's value that a walk accumulates; for a Belief it is a Transform.
@@ -62,7 +62,7 @@ template <class Samples>
 Result<SampleHistory::Bracket> newest_of(const HeldVersion& edge, const Samples& samples,
                                          std::int64_t t, const Query& query) {
   if (edge.lacks_sample()) return no_data(Errc::kNotYet);
-  const std::int64_t beyond = t - edge.stamp;
+  const std::int64_t beyond = saturating_subtract(t, edge.stamp);
   if (beyond > query.extrapolate.count() || beyond > samples.reach(edge.number)) {
     return no_data(Errc::kNotYet);
   }
@@ -129,8 +129,8 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
   if (!samples.make_whole(*found, copies)) return not_readable();
   const Sample& before = *found->before;
   const Sample& newest = *found->after;
-  const double span = seconds(edge.stamp - before.stamp);
-  const double beyond = seconds(moment.t - edge.stamp);
+  const double span = seconds(saturating_subtract(edge.stamp, before.stamp));
+  const double beyond = seconds(saturating_subtract(moment.t, edge.stamp));
   const double s = 1.0 + beyond / span;
   const bool revised = before.revision() != nullptr || newest.revision() != nullptr;
   moment.correlated = moment.correlated || is_correlated(newest);
@@ -170,8 +170,8 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
                                 const Samples& samples, SampleHistory::Bracket found,
                                 Moment& moment) {
   const std::int64_t begin = found.before->stamp;
-  const auto span = static_cast<double>(found.after->stamp - begin);
-  const double s = static_cast<double>(moment.t - begin) / span;
+  const auto span = static_cast<double>(saturating_subtract(found.after->stamp, begin));
+  const double s = static_cast<double>(saturating_subtract(moment.t, begin)) / span;
   const bool noisy = samples.has_noise();
   TransformParts first{};
   TransformParts second{};

@@ -272,9 +272,17 @@ class Forest {
   /// An error of such a lookup, with the text that lookups of own edges have.
   [[nodiscard]] Error explain(Error error, std::string_view a, std::string_view b,
                               const Query& query, const RemoteEdges& others) const;
+  /// The newest X_AB before owners have changed the path, which is not known here yet: each owner
+  /// is read at the last commit at which its edges were those of the path. So it is no older than
+  /// what lookups have found before.
+  /// @return as lookup(); what has been overwritten cannot be read
+  [[nodiscard]] Result<StampedTransform> lookup_former(std::string_view a, std::string_view b,
+                                                       const RemoteEdges& others) const;
   /// Binds the edges of others on the path to the memory of those that are attached.
+  /// @param former  also edges that their owners have changed since, for lookup_former()
   /// @return how many of them are bound now, if all are; otherwise 0
-  std::size_t bind(std::string_view a, std::string_view b, RemoteEdges& others) const;
+  std::size_t bind(std::string_view a, std::string_view b, RemoteEdges& others,
+                   bool former = false) const;
   std::size_t bind(Handle a, Handle b, RemoteEdges& others) const;
 
   /// As lookup(), for segments of a path that another participant asks for. Their ends may be

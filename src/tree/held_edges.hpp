@@ -24,6 +24,19 @@ void for_each_held(const std::vector<Ends>& segments, Visit visit) {
   }
 }
 
+/// Calls visit(version here) for each edge of a path that others hold.
+template <class Visit>
+void for_each_edge_elsewhere(const Ends& ends, Visit visit) {
+  const Version* a = ends.a;
+  const Version* b = ends.b;
+  while (a != b) {
+    const Version*& here = a->depth >= b->depth ? a : b;
+    if (here->above == nullptr) break;
+    if (!here->held()) visit(*here);
+    here = Frames::at(*here->above, ends.commit);
+  }
+}
+
 /// Calls visit(version here, edge) for each edge of a path, the edge in the memory of its owner if
 /// others hold it: an OwnEdge, or a RemoteEdge, without a version if it cannot be read.
 template <class Visit>

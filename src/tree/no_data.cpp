@@ -106,7 +106,7 @@ std::string gap(std::int64_t from, std::int64_t to) {
 std::string beyond(const DatedEdge& edge, std::int64_t t, const Query& query) {
   std::string text = "its newest sample is " + gap(edge.newest, t) + " older";
   if (query.extrapolate.count() == 0) return text;
-  if (t - edge.newest > query.extrapolate.count())
+  if (saturating_subtract(t, edge.newest) > query.extrapolate.count())
     return text + ", and the extrapolation limit is " + readable(query.extrapolate);
   if (edge.oldest == edge.newest) return text + ", and the only one: cannot extrapolate";
   if (edge.reach == 0) {
@@ -125,8 +125,8 @@ const DatedEdge& first_to_end(const std::vector<DatedEdge>& edges, const DatedEd
                               std::int64_t t, const Query& query) {
   const DatedEdge* found = nullptr;
   for (const DatedEdge& one : edges) {
-    const bool ends =
-        t > one.newest && t - one.newest > std::min(query.extrapolate.count(), one.reach);
+    const bool ends = t > one.newest && saturating_subtract(t, one.newest) >
+                                            std::min(query.extrapolate.count(), one.reach);
     if (ends && (found == nullptr || one.newest < found->newest)) found = &one;
   }
   return found != nullptr ? *found : slowest;

@@ -63,7 +63,8 @@ std::vector<RemoteEdges::Retired> RemoteEdges::unlink(Owner owner) {
   return unlinked;
 }
 
-bool RemoteEdges::bind(const Version& edge, std::string_view id, std::string_view parent) {
+bool RemoteEdges::bind(const Version& edge, std::string_view id, std::string_view parent,
+                       bool former) {
   std::vector<Retired> garbage;
   const Lock lock(mutex_);
   const auto owner = owners_.find(edge.owner);
@@ -77,6 +78,7 @@ bool RemoteEdges::bind(const Version& edge, std::string_view id, std::string_vie
     const std::uint64_t commit = forest.snapshot();
     place = forest.find(id, parent, commit);
     read = forest.intact(commit);
+    if (read && !place && former) place = forest.find_former(id, parent, commit);
   }
   if (!read || !place) return false;
   Cell& cell = make_cell(edge.slot);

@@ -62,8 +62,10 @@ class RemoteEdges {
   /// From now on, its edges are not bound.
   void detach(Owner owner);
 
-  /// Binds an edge, whatever it was bound to before. @return whether it could be found
-  bool bind(const Version& edge, std::string_view id, std::string_view parent);
+  /// Binds an edge, whatever it was bound to before.
+  /// @param former  also if its owner has made it another one since; see RemoteReading::go_back()
+  /// @return whether it could be found
+  bool bind(const Version& edge, std::string_view id, std::string_view parent, bool former = false);
 
  private:
   static constexpr int kSegments = 22;
@@ -121,6 +123,18 @@ class RemoteReading {
     // The place of one that was detached meanwhile may be that of another one.
     if (of.forest != forest) return {};
     return {forest->at(binding->place, of.commit), forest, &common_errors_left_};
+  }
+
+  /// Reads the owner of this edge at the last commit at which the edge was the one that is known
+  /// here, if that is not the newest.
+  void go_back(const Version& here) {
+    const RemoteEdges::Binding* binding = edges_.find(here);
+    if (binding == nullptr) return;
+    if (!has(binding->index)) take_up(binding->index, *binding->forest);
+    Snapshot& of = owners_[binding->index];
+    if (of.forest == binding->forest) {
+      of.commit = binding->forest->last_commit_of(binding->place, of.commit);
+    }
   }
 
   /// Whether nothing that was found since clear() was overwritten.

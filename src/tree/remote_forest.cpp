@@ -160,33 +160,79 @@ std::string_view RemoteForest::text_of(const Name* theirs) const {
   return bytes != nullptr ? std::string_view(bytes, text.size()) : std::string_view();
 }
 
-std::optional<RemotePlace> RemoteForest::find(std::string_view id, std::string_view parent,
-                                              std::uint64_t commit) const {
+const Name* RemoteForest::name_of(std::string_view id) const {
   using Table = IdTable::Table;
   const auto* theirs = static_cast<const Table*>(roots_->names.load(std::memory_order_acquire));
   const Table* table = here(theirs);
   const std::uint64_t mask = table != nullptr ? load(table->mask) : kMostNames;
-  if (mask >= kMostNames || parent.empty()) return std::nullopt;
+  if (mask >= kMostNames) return nullptr;
   // NOLINTNEXTLINE(*-reinterpret-cast): as Table::cells()
   const auto* cells = here(reinterpret_cast<const Table::Cell*>(theirs + 1), mask + 1);
-  if (cells == nullptr) return std::nullopt;
+  if (cells == nullptr) return nullptr;
   const std::uint32_t hash = IdTable::hash_of(id);
   for (std::uint64_t probes = 0; probes <= mask; ++probes) {
     const Name* called = cells[(hash + probes) & mask].load(std::memory_order_acquire);
-    if (called == nullptr) return std::nullopt;
+    if (called == nullptr) return nullptr;
     const Name* name = here(called);
-    if (name == nullptr || load(name->hash) != hash || text_of(called) != id) continue;
-    const Head* head = head_of(load(name->slot));
-    const Version* version = head != nullptr ? at(*head, commit) : nullptr;
-    if (version == nullptr || load(version->name) != called) return std::nullopt;
-    const Head* above = here(load(version->above));
-    const Version* top = above != nullptr ? at(*above, commit) : nullptr;
-    if (top == nullptr || text_of(load(top->name)) != parent) return std::nullopt;
-    const RemotePlace found{head, load(version->attachment)};
-    if (found.attachment == 0 || at(found, commit) == nullptr) return std::nullopt;
-    return found;
+    if (name != nullptr && load(name->hash) == hash && text_of(called) == id) return called;
+  }
+  return nullptr;
+}
+
+bool RemoteForest::is_edge(const Version& version, const Name* called, std::string_view parent,
+                           std::uint64_t commit) const {
+  if (parent.empty() || load(version.name) != called || load(version.attachment) == 0) return false;
+  if (load(version.owner) != kHeldHere) return false;
+  const Head* above = here(load(version.above));
+  const Version* top = above != nullptr ? at(*above, commit) : nullptr;
+  return top != nullptr && text_of(load(top->name)) == parent;
+}
+
+std::optional<RemotePlace> RemoteForest::find(std::string_view id, std::string_view parent,
+                                              std::uint64_t commit) const {
+  const Name* called = name_of(id);
+  const Name* name = here(called);
+  const Head* head = name != nullptr ? head_of(load(name->slot)) : nullptr;
+  const Version* version = head != nullptr ? at(*head, commit) : nullptr;
+  if (version == nullptr || !is_edge(*version, called, parent, commit)) return std::nullopt;
+  const RemotePlace found{head, load(version->attachment)};
+  if (at(found, commit) == nullptr) return std::nullopt;
+  return found;
+}
+
+std::optional<RemotePlace> RemoteForest::find_former(std::string_view id, std::string_view parent,
+                                                     std::uint64_t commit) const {
+  const Name* called = name_of(id);
+  const Name* name = here(called);
+  const Head* head = name != nullptr ? head_of(load(name->slot)) : nullptr;
+  const Version* version = head != nullptr ? at(*head, commit) : nullptr;
+  // The version was that of the slot up to this commit.
+  std::uint64_t last = commit;
+  for (int newer = 0; version != nullptr && newer < kMostNewer; ++newer) {
+    const std::uint64_t since = load(version->commit);
+    if (since == 0 || since > last) return std::nullopt;
+    if (is_edge(*version, called, parent, last)) {
+      const RemotePlace found{head, load(version->attachment)};
+      if (!intact(last)) return std::nullopt;
+      return found;
+    }
+    last = since - 1;
+    version = here(static_cast<const Version*>(load(version->older)));
   }
   return std::nullopt;
+}
+
+std::uint64_t RemoteForest::last_commit_of(const RemotePlace& place, std::uint64_t commit) const {
+  const Version* version = at(*place.head, commit);
+  std::uint64_t last = commit;
+  for (int newer = 0; version != nullptr && newer < kMostNewer; ++newer) {
+    const std::uint64_t since = load(version->commit);
+    if (since == 0 || since > last) return 0;
+    if (is(*version, place)) return last;
+    last = since - 1;
+    version = here(static_cast<const Version*>(load(version->older)));
+  }
+  return 0;
 }
 
 bool RemoteEdge::read(const FlatCorrelation* theirs, Correlation& copy) const {

@@ -54,6 +54,13 @@ class RemoteForest {
   [[nodiscard]] std::optional<RemotePlace> find(std::string_view id, std::string_view parent,
                                                 std::uint64_t commit) const;
 
+  /// As find(), of the newest commit up to this one at which there was such an edge, unless that
+  /// has been overwritten.
+  [[nodiscard]] std::optional<RemotePlace> find_former(std::string_view id, std::string_view parent,
+                                                       std::uint64_t commit) const;
+  /// The newest commit, up to this one, at which the edge was that one; 0: none.
+  [[nodiscard]] std::uint64_t last_commit_of(const RemotePlace& place, std::uint64_t commit) const;
+
   /// The edge at a commit; null if it is another one by now, or cannot be read.
   [[nodiscard]] const HeldVersion* at(const RemotePlace& place, std::uint64_t commit) const {
     const HeldVersion* newest =
@@ -97,6 +104,11 @@ class RemoteForest {
   [[nodiscard]] const HeldVersion* older(const RemotePlace& place, std::uint64_t commit) const;
   [[nodiscard]] const Head* head_of(std::uint32_t slot) const;
   [[nodiscard]] std::string_view text_of(const Name* theirs) const;
+  // The name of a frame, at the owner's address; null: it has none of this id.
+  [[nodiscard]] const Name* name_of(std::string_view id) const;
+  // Whether a version is of the frame with this name, below this parent, at a commit.
+  [[nodiscard]] bool is_edge(const Version& version, const Name* called, std::string_view parent,
+                             std::uint64_t commit) const;
 
   const char* memory_;
   std::size_t size_;
@@ -133,7 +145,7 @@ class RemoteSamples {
  public:
   explicit RemoteSamples(const RemoteEdge& edge);
 
-  [[nodiscard]] bool has_noise() const { return there() && samples_->has_noise(); }
+  [[nodiscard]] bool has_noise() const { return there() && is_set(samples_->has_noise()); }
   [[nodiscard]] const Covariance& process_noise() const { return samples_->timing().process_noise; }
   [[nodiscard]] bool drifts() const { return there() && is_set(samples_->timing().drifts); }
   [[nodiscard]] std::uint64_t oldest() const { return there() ? samples_->oldest() : UINT64_MAX; }

@@ -62,7 +62,7 @@ std::optional<std::uint64_t> written_on(const Ends& ends, RemoteReading& reading
 }
 
 template <class Name>
-std::size_t bound(const Frames& frames, Name a, Name b, RemoteEdges& others) {
+std::size_t bound(const Frames& frames, Name a, Name b, RemoteEdges& others, bool former = false) {
   const epoch::Guard guard;
   const auto found = frames.ends(a, b);
   if (!found) return 0;
@@ -74,7 +74,7 @@ std::size_t bound(const Frames& frames, Name a, Name b, RemoteEdges& others) {
     if (here->depth == 0) return 0;
     const Version* above = Frames::at(*here->above, found->commit);
     if (!here->held()) {
-      if (!others.bind(*here, here->name->text, above->name->text)) return 0;
+      if (!others.bind(*here, here->name->text, above->name->text, former)) return 0;
       ++count;
     }
     here = above;
@@ -122,8 +122,19 @@ Error Forest::explain(Error error, std::string_view a, std::string_view b, const
   RemoteReading reading(others);
   return tfdude::explained(std::move(error), *ends, reading, query, impl_->now_);
 }
-std::size_t Forest::bind(std::string_view a, std::string_view b, RemoteEdges& others) const {
-  return bound(impl_->frames_, a, b, others);
+Result<StampedTransform> Forest::lookup_former(std::string_view a, std::string_view b,
+                                               const RemoteEdges& others) const {
+  const epoch::Guard guard;
+  const auto found = impl_->frames_.ends(a, b);
+  if (!found) return tl::unexpected(found.error());
+  return computed<StampedTransform>(others, [&](RemoteReading& reading, StampedTransform& X_AB) {
+    for_each_edge_elsewhere(*found, [&](const Version& here) { reading.go_back(here); });
+    return compute_queried(*found, Query{}, reading, X_AB);
+  });
+}
+std::size_t Forest::bind(std::string_view a, std::string_view b, RemoteEdges& others,
+                         bool former) const {
+  return bound(impl_->frames_, a, b, others, former);
 }
 std::size_t Forest::bind(Handle a, Handle b, RemoteEdges& others) const {
   return bound(impl_->frames_, a, b, others);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "base/saturating.hpp"
 #include "tree/forest.hpp"
 #include "tree/sample.hpp"
 #include "tree/sample_store.hpp"
@@ -43,7 +44,7 @@ class SampleHistory {
   SampleHistory& operator=(const SampleHistory&) = delete;
 
   [[nodiscard]] const EdgeTiming& timing() const { return timing_; }
-  [[nodiscard]] bool has_noise() const { return has_noise_; }
+  [[nodiscard]] const bool& has_noise() const { return has_noise_; }
 
   /// The samples around t. `newest` is the number of the newest sample that the reader sees, which
   /// is later than t.
@@ -265,8 +266,8 @@ SampleHistory::Bracket samples_around(const Samples& samples, std::int64_t t, st
   if (low >= high || after == nullptr || (before != nullptr && t < before->stamp)) return {};
   std::uint64_t at = low;
   if (before != nullptr) {
-    const double share =
-        static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
+    const double share = static_cast<double>(saturating_subtract(t, before->stamp)) /
+                         static_cast<double>(saturating_subtract(after->stamp, before->stamp));
     // Otherwise what another process has written makes no sense.
     if (share >= 0 && share <= 1) {
       at += static_cast<std::uint64_t>(share * static_cast<double>(high - low));
@@ -298,7 +299,8 @@ std::int64_t extrapolation_reach(const Samples& samples, std::uint64_t newest,
   const Sample* before = samples.sample(newest - 1);
   const Sample* after = samples.sample(newest);
   if (before == nullptr || after == nullptr) return 0;
-  const std::int64_t interval = after->stamp - before->stamp;
+  const std::int64_t interval = saturating_subtract(after->stamp, before->stamp);
+  if (interval <= 0) return 0;  // what another process has written makes no sense
   return interval > INT64_MAX / kMostIntervals ? INT64_MAX : kMostIntervals * interval;
 }
 

@@ -131,6 +131,15 @@ void run(const std::uint8_t* data, std::size_t size) {
   if (data[0] % 4 > 1) query.order = Order::kFourth;
   if (const auto X = reader.forest.lookup(link(0), link(kDepth), others)) demand_finite(*X);
   if (const auto X = reader.forest.lookup(link(0), link(kDepth), query, others)) demand_finite(*X);
+  const auto segments =
+      reader.forest.lookup_segments({{link(0), link(kDepth)}}, query, query.at, others);
+  for (std::size_t i = 0; segments && i < segments->values.size(); ++i) {
+    demand_finite(segments->values[i]);
+  }
+  (void)reader.forest.bind(link(0), link(kDepth), others, true);
+  if (const auto X = reader.forest.lookup_former(link(0), link(kDepth), others)) demand_finite(*X);
+  (void)reader.forest.written(link(0), link(kDepth), others);
+  (void)reader.forest.explain({Errc::kTooOld, {}}, link(0), link(kDepth), query, others);
   (void)RemoteForest::open(reader.copy, kSize);
 }
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <string>
@@ -201,6 +202,32 @@ TEST_CASE("keys: doctor finds keys that do not fit, and those about to expire") 
   CHECK(codes(robot.files.path() + "/none") == Codes{"keys_invalid", "nobody"});
   REQUIRE(renew_identity(robot.keys.path(), "eye", Days(5), now()));
   CHECK(codes(robot.keys.path("eye")) == Codes{"keys_expire"});
+}
+
+TEST_CASE("keys: who may not look gets no memory of an owner") {
+  const SecuredRobot robot;
+  robot.keys.add("controller", streaming("arm"));
+  // Of others, as this process owns nothing.
+  const auto mapped = [] {
+    std::ifstream maps("/proc/self/maps");
+    std::size_t count = 0;
+    for (std::string line; std::getline(maps, line);) {
+      if (line.find("memfd:tfdude") != std::string::npos) ++count;
+    }
+    return count;
+  };
+  auto controller = robot.client("controller");
+  REQUIRE(controller);
+  REQUIRE(eventually([&] { return controller->exists("secret_forearm"); }));
+  controller->find_memory();
+  CHECK(mapped() == 0);
+  for (const PartitionInfo& one : controller->partitions().value()) CHECK_FALSE(one.in_memory);
+  auto eye = robot.client("eye");
+  REQUIRE(eye);
+  CHECK(eventually([&] {
+    eye->find_memory();
+    return mapped() == 2;
+  }));
 }
 
 TEST_CASE("keys: who only streams sees the structure, streams, and asks nothing") {

@@ -215,6 +215,38 @@ TEST_CASE("memory: a killed owner is unreachable at once, and its next process i
   CHECK(testing::x_of(d.memory.lookup(parent, "hand_left")) == 3);
 }
 
+TEST_CASE("memory: the last values of an owner that died are there for who asks for them") {
+  Two d;
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  REQUIRE(d.dds.update("hand_left", testing::along_x(3)));
+  Query last;
+  last.last_known = true;
+  const auto before = d.memory.lookup("world", "hand_left", last);
+  REQUIRE(before);
+  CHECK(before->basis.lost.empty());
+  d.arms->kill();
+  REQUIRE(
+      eventually([&] { return outcome(d.memory.lookup("world", "hand_left")) == "unreachable"; }));
+  CHECK(outcome(d.memory.lookup("world", "hand_left", Query{})) == "unreachable");
+  const auto after = d.memory.lookup("world", "hand_left", last);
+  REQUIRE(after);
+  CHECK(transform_diff(*after, *before, 1e-12) == "");
+  REQUIRE(after->basis.lost.size() == 1);
+  CHECK(after->basis.lost[0].partition == "arms");
+  CHECK(after->basis.lost[0].ago < std::chrono::seconds(30));
+  const auto later = d.memory.lookup("world", "hand_left", last);
+  REQUIRE(later);
+  CHECK(later->basis.lost[0].ago > after->basis.lost[0].ago);
+  // A client that has not read the memory has nothing.
+  CHECK(outcome(d.dds.lookup("world", "hand_left", last)) == "unreachable");
+  // What is known of the next process counts.
+  d.arms.emplace(d.domain.serve(testing::kArmsFile));
+  CHECK(eventually([&] {
+    const auto now = d.memory.lookup("world", "hand_left", last);
+    return now && now->basis.lost.empty();
+  }));
+}
+
 TEST_CASE("memory: an owner that hangs is lost as over DDS, and is read again when it goes on") {
   Two d;
   REQUIRE(eventually([&] { return all_in_memory(d.memory); }));

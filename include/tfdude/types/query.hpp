@@ -23,6 +23,16 @@ struct Query {
   /// the covariance of the answer.
   std::optional<Time> age_noise_until;
   Order order = Order::kSecond;
+  /// Where an owner on this computer has died, or does not respond: the last values of its edges,
+  /// if this client has read its memory before. The answer names the owner (Basis::lost). Only of
+  /// Client::lookup(). Otherwise such a lookup fails with kUnreachable.
+  bool last_known = false;
+};
+
+/// An owner that is gone.
+struct LostOwner {
+  std::string partition;
+  std::chrono::nanoseconds ago{0};  ///< since that was noticed
 };
 
 /// What the covariance of an answer is based on. Edges without a stated correlation count as
@@ -38,6 +48,8 @@ struct Basis {
   /// path. The covariance is that of all others. A watched path that is sent composed names the
   /// frame at the end of a segment for all of its edges.
   std::vector<std::string> unspecified{};
+  /// The owners that are gone: the answer has their last values. See Query::last_known.
+  std::vector<LostOwner> lost{};
 };
 
 /// A transform and its instant. Without a stamp it holds for all times: all edges are static.

@@ -396,6 +396,49 @@ TEST_CASE("an edge that its owner has moved is not read until that is known here
   CHECK(here.bind("base", "tip", others) == 0);
 }
 
+TEST_CASE("until it is known here what became of an edge, its last value is there") {
+  SharedForest arm;
+  REQUIRE(arm.forest.add("base", "", along_x(0)));
+  REQUIRE(arm.forest.add("side", "base", along_x(100)));
+  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
+  Forest here;
+  RemoteEdges others;
+  others.attach(1, arm.seen(), nullptr);
+  REQUIRE(here.put_remote("base", "", 1));
+  REQUIRE(here.put_remote("side", "base", 1));
+  REQUIRE(here.put_remote("tip", "base", 1));
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  const auto former = [&] { return here.lookup_former("base", "tip", others); };
+  CHECK(x_of(former()) == 1);
+  REQUIRE(arm.forest.update("tip", along_x(2)));
+  CHECK(x_of(former()) == 2);
+  REQUIRE(arm.forest.move("tip", "side"));
+  REQUIRE(arm.forest.update("tip", along_x(5)));
+  CHECK(outcome(here.lookup("base", "tip", Query{}, others)) == "not_owner");
+  CHECK(x_of(former()) == 2);
+  // Both edges of the path, as they were when the last one was that of the path.
+  REQUIRE(arm.forest.update("side", along_x(200)));
+  REQUIRE(arm.forest.move("tip", "base"));
+  REQUIRE(arm.forest.update("tip", along_x(7)));
+  REQUIRE(here.put_remote("tip", "side", 1));
+  CHECK(outcome(former()) == "not_owner");
+  CHECK(here.bind("base", "tip", others) == 0);
+  REQUIRE(here.bind("base", "tip", others, true) == 2);
+  CHECK(outcome(here.lookup("base", "tip", Query{}, others)) == "not_owner");
+  CHECK(x_of(former()) == 205);
+  REQUIRE(arm.forest.update("side", along_x(300)));
+  CHECK(x_of(former()) == 205);
+  // That is not kept for ever.
+  for (int i = 0; i < 1000; ++i) REQUIRE(arm.forest.update("side", along_x(i)));
+  CHECK_FALSE(former());
+  CHECK(here.bind("base", "tip", others, true) == 0);
+  // Once it is known here, it counts again.
+  REQUIRE(here.put_remote("tip", "base", 1));
+  REQUIRE(here.bind("base", "tip", others, true) == 1);
+  CHECK(x_of(here.lookup("base", "tip", Query{}, others)) == 7);
+  CHECK(x_of(former()) == 7);
+}
+
 TEST_CASE("what is detached is not read, and its memory is kept while somebody reads it") {
   SharedForest arm;
   REQUIRE(arm.forest.add("base", "", along_x(0)));

@@ -1,0 +1,92 @@
+#include <utility>
+#include <vector>
+
+#include "base/mutex.hpp"
+#include "runtime/watched_path.hpp"
+
+// Those who wait for something new of a watched path.
+namespace tfdude {
+
+std::shared_ptr<void> WatchedPath::on_news(Listener listener) {
+  const Lock lock(listeners_->mutex);
+  const auto mine = listeners_->all.insert(listeners_->all.end(), std::move(listener));
+  return {nullptr, [listeners = listeners_, mine](void*) {
+            const Lock removing(listeners->mutex);
+            listeners->all.erase(mine);
+          }};
+}
+
+// One callback for values. Its calls are posted only if none is due.
+struct WatchedPath::Values {
+  std::weak_ptr<const WatchedPath> path;
+  ValueCallback callback;
+  std::shared_ptr<Callbacks::Line> line;
+  std::atomic<bool> due{false};
+  // The following belong to the calls.
+  std::optional<std::uint64_t> messages{};  // that had come with the value of the last call
+  bool failed = false;                      // it had none
+
+  static void post(const std::shared_ptr<Values>& values) {
+    if (values->due.exchange(true)) return;
+    values->line->post([values] { values->call(); });
+  }
+  void call() {
+    due = false;
+    const auto watched = path.lock();
+    if (!watched) return;
+    const std::uint64_t now = watched->messages();
+    const auto X = watched->lookup({});
+    if (X ? messages == now && !failed : failed) return;
+    if (X) messages = now;
+    failed = !X;
+    callback(X);
+  }
+};
+
+std::shared_ptr<void> WatchedPath::on_value(ValueCallback callback) {
+  if (routes_ == nullptr) return nullptr;
+  auto values = std::make_shared<Values>();
+  values->path = weak_from_this();
+  values->callback = std::move(callback);
+  values->line = routes_->another();
+  std::list<std::shared_ptr<Values>>::iterator mine;
+  {
+    const Lock lock(listeners_->mutex);
+    mine = listeners_->values.insert(listeners_->values.end(), values);
+  }
+  Values::post(values);
+  return {nullptr, [listeners = listeners_, mine, values](void*) {
+            {
+              const Lock removing(listeners->mutex);
+              listeners->values.erase(mine);
+            }
+            values->line->close();
+          }};
+}
+
+void WatchedPath::tell() {
+  changed_.notify_all();
+  std::vector<std::shared_ptr<Values>> values;
+  {
+    const Lock lock(listeners_->mutex);
+    for (const auto& listener : listeners_->all) listener();
+    values.assign(listeners_->values.begin(), listeners_->values.end());
+  }
+  for (const auto& one : values) Values::post(one);
+}
+
+bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadline) const {
+  Lock lock(mutex_);
+  return changed_.wait_until(lock, deadline, [&] { return this->messages() > messages; });
+}
+
+Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
+  Lock lock(mutex_);
+  changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) {
+    return in_memory() || (followed_ != nullptr && !followed_->lacks_history());
+  });
+  if (live()) return {};
+  return tl::unexpected(why_not_);
+}
+
+}  // namespace tfdude
