@@ -143,7 +143,7 @@ TEST_CASE("keys command: wrong usage is rejected") {
     CHECK(error.at("code") == code);
     CHECK_THAT(error.at("message").get<std::string>(), ContainsSubstring(part));
   };
-  rejected({}, 2, "usage", "subcommand");
+  rejected({}, 2, "usage", "one of init, daemon");
   rejected({"check"}, 2, "usage", "DIR");
   rejected({"check", path, "--domain", "3"}, 2, "usage", "--domain");
   rejected({"init", path, "--days", "0"}, 2, "usage", "--days");
