@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <memory>
@@ -31,6 +32,8 @@ namespace tfdude::cli {
 /// nobody reads the log, lines are lost rather than delaying the program. The journal gets
 /// the level instead of the time and the name, which it knows.
 inline void log_to_standard_error() {
+  // Each line is one write, colours and all: what others write to the terminal stays outside it.
+  (void)std::setvbuf(stderr, nullptr, _IOLBF, BUFSIZ);
   spdlog::set_default_logger(spdlog::create_async_nb<BoundedSink>(
       "tfdude", std::make_shared<spdlog::sinks::stderr_color_sink_mt>()));
   if (is_journal(STDERR_FILENO)) {

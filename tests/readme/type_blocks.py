@@ -106,14 +106,22 @@ class Shell:
         os.close(self.terminal)
 
 
-def check_width(line, printed):
-    """What a person reads fits the terminal, but for errors, which are one line."""
-    if not line.startswith("tfdude ") or any(mark in line for mark in ("--json", "# until Ctrl-C", "|| true")):
-        return
+def fault_of(line, printed, status):
+    """None if all is well with the line."""
+    until_interrupted = "# until Ctrl-C" in line
+    # A program that Ctrl-C kills before it can react has status 130.
+    if status != 0 and not (until_interrupted and status == 130):
+        return f"status {status}"
+    if re.match("tfdude (?!events)", line) and not printed.strip():
+        return "no output"
+    # What a person reads fits the terminal, but for errors, which are one line.
+    if not line.startswith("tfdude ") or until_interrupted or "--json" in line or "|| true" in line:
+        return None
     for printed_line in printed.splitlines():
         from_background = printed_line.startswith("[")  # a daemon's log, or bash about a job
         if len(printed_line) > COLUMNS and not from_background:
-            raise SystemExit(f"more than {COLUMNS} columns of: {line}\n{printed_line}")
+            return f"more than {COLUMNS} columns"
+    return None
 
 
 def type_all(shell_blocks, folder, environment):
@@ -122,13 +130,9 @@ def type_all(shell_blocks, folder, environment):
     with Shell(folder, environment) as shell:
         for line in (line for block in shell_blocks for line in lines_of(block)):
             printed, status = shell.type(line)
-            print(f"$ {line}\n{printed.strip()}\n", flush=True)
-            # A program that Ctrl-C kills before it can react has status 130.
-            if status != 0 and not ("# until Ctrl-C" in line and status == 130):
-                raise SystemExit(f"status {status} of: {line}")
-            if re.match("tfdude (?!events)", line) and not printed.strip():
-                raise SystemExit(f"no output of: {line}")
-            check_width(line, printed)
+            print(f"$ {line}", flush=True)
+            if (fault := fault_of(line, printed, status)) is not None:
+                raise SystemExit(f"{fault} of: {line}\n{printed}")
             transcript += printed
     return transcript
 
