@@ -139,6 +139,11 @@ std::vector<EdgeCursor> WatchedGroup::fresh_cursors() const {
   return cursors;
 }
 
+void WatchedGroup::begin(const PushedValues& told) {
+  const auto newest = told.entries.empty() ? std::nullopt : told.entries.back().stamp;
+  begun_ = SeenSegments{told.commit, newest.value_or(Time::min()), false};
+}
+
 Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
   auto values = all(forest, from);
   if (!values) return values;
@@ -179,7 +184,9 @@ Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time>
 PushedValues WatchedGroup::changed(const Forest& forest) {
   if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  auto found = forest.values_since(cursors_, {newest_only, {}, true, request_.of_samples});
+  PushedQuery query{newest_only, {}, true, request_.of_samples};
+  if (begun_) query.after = begun_->commit;
+  auto found = forest.values_since(cursors_, query);
   PushedValues pushed{id_, std::move(found.values), told_, found.commit};
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;
@@ -233,7 +240,9 @@ bool WatchedGroup::is_new(const PushedValue& entry) const {
 PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   PushedValues pushed{id_, {}, told_, told_};
   const auto& before = sent_.front();
-  SeenSegments seen{told_, Time::min(), !before || request_.period > std::chrono::nanoseconds(0)};
+  const bool newest_only = request_.period > std::chrono::nanoseconds(0);
+  SeenSegments seen{told_, Time::min(), newest_only || (!before && !begun_)};
+  if (!before && begun_) seen = {begun_->commit, begun_->until, newest_only};
   if (before && before->stamp) seen.until = *before->stamp;
   const std::size_t most = kMaxItems / request_.segments.size();
   auto all = forest.segments_since(request_.segments, seen, most);
@@ -254,7 +263,7 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   };
   for (auto earlier = all->begin(); earlier + 1 != all->end(); ++earlier) {
     for (PushedValue& entry : entries_of(*earlier)) {
-      if (again || !begins(entry)) push(std::move(entry));
+      if (again || !before || !begins(entry)) push(std::move(entry));
     }
   }
   for (PushedValue& entry : entries_of(newest)) {

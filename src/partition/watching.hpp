@@ -71,9 +71,13 @@ class WatchedGroup {
   ///   small between samples.
   [[nodiscard]] Result<PushedValues> snapshot(const Forest& forest, std::optional<Time> from) const;
 
+  /// The first watcher was told this, a snapshot().
+  void begin(const PushedValues& told);
+
   /// Values written since the last call: all samples, or the newest of each edge if the watchers
-  /// want a lower rate. Empty while an edge is not held, or has another parent: the watchers then
-  /// use another route.
+  /// want a lower rate. The first has all edges, so that it may come before the reply, and the
+  /// samples since begin(). Empty while an edge is not held, or has another parent: the watchers
+  /// then use another route.
   [[nodiscard]] PushedValues next_push(const Forest& forest);
 
  private:
@@ -89,6 +93,7 @@ class WatchedGroup {
   std::uint64_t id_;
   WatchRequest request_;
   std::uint64_t told_ = 0;                        // commit of the last push
+  std::optional<SeenSegments> begun_;             // what the first watcher was told
   std::vector<EdgeCursor> cursors_;               // by edge
   std::vector<std::optional<PushedValue>> sent_;  // by composed segment
   CovarianceNumbers numbers_;

@@ -59,7 +59,8 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
     const Lock lock(mutex_);
     const bool first = groups_.empty();
     auto known = groups_.find(group);
-    if (known == groups_.end()) {
+    const bool begins = known == groups_.end();
+    if (begins) {
       if (auto room = check_room(request, watcher); !room) {
         ++refused_;
         return tl::unexpected(std::move(room.error()));
@@ -73,6 +74,7 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
     if (!snapshot) {
       end(known);
     } else {
+      if (begins) known->second.watched.begin(*snapshot);
       known->second.lease = sink_.now() + kWatchLease;
     }
     if (first && !groups_.empty() && !stopped_) forest_.on_commit([this] { sink_.wake(); });

@@ -69,7 +69,7 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
                             const PushedQuery& query) {
   const SampleHistory& samples = *edge.samples;
   std::uint64_t first = edge.number;
-  if (cursor.history == 0) {
+  if (cursor.history == 0 && !query.after) {
     const std::int64_t from = query.from ? nanoseconds(*query.from) : edge.stamp;
     while (first > samples.oldest() && samples.stamp(first) > from) --first;
     return first;
@@ -110,6 +110,9 @@ class Telling {
   /// The samples from `first` on whose commits are after `seen`; 0: nothing was seen.
   void tell_samples(std::uint64_t first, std::uint64_t seen);
   void tell_newest(std::uint64_t seen);
+  void tell_newest_if_none() {
+    if (values_.size() == begin_) tell_newest(0);
+  }
   void tell_no_sample(std::uint64_t seen);
 
   void finish(bool begins);
@@ -213,7 +216,9 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
   } else if (edge.moving() && query.newest_only) {
     telling.tell_newest(seen);
   } else if (edge.moving()) {
-    telling.tell_samples(first_to_tell(edge, cursor, seen, query), seen);
+    const std::uint64_t told = cursor.history == 0 ? query.after.value_or(0) : seen;
+    telling.tell_samples(first_to_tell(edge, cursor, told, query), told);
+    if (begins) telling.tell_newest_if_none();
   } else if (edge.commit > seen) {
     telling.tell(std::nullopt, edge.X_PC);
   }

@@ -70,6 +70,8 @@ struct PushedQuery {
   /// Tell how each sample is correlated that an observation has corrected. Otherwise such a sample
   /// has all of its covariance, as a watcher of single edges needs it.
   bool of_samples = false;
+  /// If nothing was seen yet: besides the newest samples, those of later commits than this.
+  std::optional<std::uint64_t> after{};
 };
 
 }  // namespace tfdude

@@ -64,6 +64,35 @@ TEST_CASE("a group is pushed all values and then each change once") {
   CHECK(listed(group.next_push(arm.forest)) == "0@2=9 1@2=99 ");
 }
 
+TEST_CASE("the first push has all edges and what was written since the first reply") {
+  Arm arm;
+  REQUIRE(arm.forest.update("arm", along_x(11), ms(1)));
+  REQUIRE(arm.forest.update("arm", along_x(13), ms(3)));
+  WatchedGroup group(7, {{kArm, kHand}});
+  WatchedGroup slow(8, {{kArm, kHand}, false, false, 10ms});
+  WatchedGroup composed(9, {{{"base", "hand"}}, true});
+  for (WatchedGroup* one : {&group, &slow, &composed}) {
+    one->begin(*one->snapshot(arm.forest, {}));
+  }
+  SECTION("nothing") {
+    CHECK(listed(group.next_push(arm.forest)) == "1@-=100 0@3=13 ");
+    CHECK(listed(slow.next_push(arm.forest)) == "1@-=100 0@3=13 ");
+    CHECK(listed(composed.next_push(arm.forest)) == "0@3=113 ");
+  }
+  SECTION("samples, of which one is late") {
+    REQUIRE(arm.forest.update("arm", along_x(12), ms(2)));
+    REQUIRE(arm.forest.update("arm", along_x(14), ms(4)));
+    REQUIRE(arm.forest.update("arm", along_x(15), ms(5)));
+    CHECK(listed(group.next_push(arm.forest)) == "1@-=100 0@2=12 0@4=14 0@5=15 ");
+    CHECK(listed(slow.next_push(arm.forest)) == "1@-=100 0@5=15 ");
+    // Between its neighbours, a late sample has changed the segment.
+    CHECK(listed(composed.next_push(arm.forest)) == "0@1=111 0@2=112 0@3=113 0@4=114 0@5=115 ");
+  }
+  for (WatchedGroup* one : {&group, &slow, &composed}) {
+    CHECK(listed(one->next_push(arm.forest)).empty());
+  }
+}
+
 TEST_CASE("a covariance that stays the same is pushed once") {
   const auto with_stddev = [](double x, double stddev) {
     Transform X = along_x(x);
