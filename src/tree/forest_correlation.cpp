@@ -4,6 +4,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/interpolate.hpp"
 
+#include "base/saturating.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 
@@ -200,9 +201,10 @@ void Forest::Impl::show_revision(std::uint32_t slot) {
 // An edge whose owner has restarted goes on from its stored sample.
 void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
-  const std::int64_t span = newest.samples->timing().span.count();
-  const bool begins = newest.left_behind() ? stamp < newest.stamp : stamp < newest.stamp - span;
-  if (!newest.limits() || begins) {
+  const std::int64_t span = newest.left_behind() ? 0 : newest.samples->timing().span.count();
+  // An edge without a sample has the least stamp of all.
+  const std::int64_t limit = saturating_subtract(newest.stamp, span);
+  if (!newest.limits() || stamp < limit) {
     Transform X_PC = value.X_PC;
     if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
     return push_checked(newest, {X_PC}, stamp);

@@ -19,7 +19,7 @@
 #include "support/catch.hpp"
 #include "support/networks.hpp"
 #include "support/random.hpp"
-#include "support/thread_sanitizer.hpp"
+#include "support/sanitizers.hpp"
 
 namespace tfdude {
 namespace {

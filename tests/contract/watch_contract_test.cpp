@@ -24,7 +24,7 @@
 #include "support/process.hpp"
 #include "support/random.hpp"
 #include "support/recorder.hpp"
-#include "support/thread_sanitizer.hpp"
+#include "support/sanitizers.hpp"
 
 namespace tfdude {
 namespace {

@@ -10,7 +10,7 @@
 #include "tfdude/transport/loopback.hpp"
 
 #include "support/domain_lease.hpp"
-#include "support/thread_sanitizer.hpp"
+#include "support/sanitizers.hpp"
 
 // The networks that contract tests run over. Needs TFDUDE_LOOPBACK_PROFILE.
 namespace tfdude::testing {
