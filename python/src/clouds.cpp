@@ -51,7 +51,10 @@ Eigen::Map<const Eigen::Matrix<Number, 3, Eigen::Dynamic>> columns(const Numbers
 Eigen::Matrix3d to_own(py::handle own) {
   if (own.is_none()) return Eigen::Matrix3d::Zero();
   const Doubles values = doubles(own, {3, 3}, "own");
-  return Eigen::Map<const Eigen::Matrix3d>(values.data());
+  const Eigen::Matrix3d sigma = Eigen::Map<const Eigen::Matrix3d>(values.data());
+  Matrix6d whole = Matrix6d::Zero();
+  whole.topLeftCorner<3, 3>() = sigma;
+  return value_of(Covariance::from_matrix(whole)).matrix().topLeftCorner<3, 3>();
 }
 
 CloudQuery to_cloud_query(py::handle at, py::handle stamps, py::handle group,

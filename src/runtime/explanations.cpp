@@ -65,6 +65,17 @@ std::vector<VarianceShare> sorted(std::vector<VarianceShare> shares, double tota
   return shares;
 }
 
+// The partition is absent.
+void blame(const PartitionInfo& absent, Cause& cause) {
+  cause.obstacle = absent.stopped ? Obstacle::kOwnerStopped : Obstacle::kOwnerLost;
+  cause.partition = absent.name;
+  cause.since = absent.since;
+  cause.needs = "partition " + quote(absent.name) + " again" +
+                (absent.host.empty() ? ""
+                                     : ", which ran on host " + absent.host + " as process " +
+                                           std::to_string(absent.pid));
+}
+
 }  // namespace
 
 Explanation Explanations::why(const std::string& a, const std::string& b, const WhyQuery& query) {
@@ -193,6 +204,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
                              const WhyQuery& query) {
   Cause cause;
   cause.error = std::move(error);
+  if (explain_missed(cause)) return cause;
   // What is missing at the time limit is no longer an error of its own, but is still missing.
   for (const std::string& id : {a, b}) {
     if (!structure_.forest.exists(id)) {
@@ -281,17 +293,19 @@ void Explanations::explain_absent(const std::vector<FrameInfo>& edges, Cause& ca
   const Directory& directory = structure_.directory;
   for (const FrameInfo& edge : edges) {
     if (edge.owner == kHeldHere || directory.reachable(edge.owner)) continue;
-    const PartitionInfo& info = directory.info(edge.owner);
-    cause.obstacle = info.stopped ? Obstacle::kOwnerStopped : Obstacle::kOwnerLost;
     cause.frame = edge.id;
-    cause.partition = info.name;
-    cause.since = info.since;
-    cause.needs = "partition " + quote(info.name) + " again" +
-                  (info.host.empty() ? ""
-                                     : ", which ran on host " + info.host + " as process " +
-                                           std::to_string(info.pid));
-    return;
+    return blame(directory.info(edge.owner), cause);
   }
+}
+
+bool Explanations::explain_missed(Cause& cause) {
+  if (cause.error.code != Errc::kUnreachable) return false;
+  const Lock lock(structure_.mutex);
+  const auto missed = structure_.directory.only_heard_of();
+  if (!missed || missed->name != cause.error.partition) return false;
+  cause.frame = cause.error.frame;
+  blame(*missed, cause);
+  return true;
 }
 
 bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {

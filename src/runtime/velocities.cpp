@@ -113,7 +113,16 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
                                       const VelocityQuery& query, const Deadline& deadline) {
   const auto interval = this->interval(a, b, query, deadline);
   if (!interval) return tl::unexpected(interval.error());
-  if (!*interval) return Velocity{};
+  if (!*interval) {  // no edge has samples
+    Query at;
+    at.at = query.at;
+    auto X_AB = lookups_.lookup<std::string_view>(a, b, at, deadline);
+    if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
+    Velocity rest;
+    rest.basis.unspecified = std::move(X_AB->basis.unspecified);
+    rest.covariance.set_complete(rest.basis.unspecified.empty());
+    return rest;
+  }
   const Interval& ends = **interval;
   EdgesTask task(structure_.forest, a, b, ends.begin, ends.end);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());

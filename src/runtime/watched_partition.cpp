@@ -1,7 +1,9 @@
 #include "runtime/watched_partition.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <string_view>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -23,6 +25,19 @@ void spread_correlations(std::vector<PushedValue>& entries) {
     const auto [known, is_last] = last.emplace(entry->index, &entry->correlation);
     if (!is_last) entry->correlation = *known->second;
   }
+}
+
+std::size_t hash_of(const Transform& X) {
+  const std::hash<std::string_view> hash;
+  const auto bytes = [](const double* first, std::size_t count) {
+    // NOLINTNEXTLINE(*-reinterpret-cast): the bytes of numbers
+    return std::string_view(reinterpret_cast<const char*>(first), count * sizeof(double));
+  };
+  const Covariance::Upper& upper = X.covariance.of_specified().upper();
+  const Eigen::Vector3d xyz = X.pose.translation();
+  const Eigen::Quaterniond q = X.pose.rotation();
+  return hash(bytes(xyz.data(), 3)) ^ (31 * hash(bytes(q.coeffs().data(), 4))) ^
+         (37 * hash(bytes(upper.data(), upper.size())));
 }
 
 // For each frame of `from` its index in `to`, if it has the same parent there.
@@ -191,7 +206,21 @@ bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, con
   // Of one commit, a part may be missing.
   if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
   if (entry.cleared && is_old) return false;
-  return !is_late || (message.reply ? missing_from_.has_value() : period_.count() == 0);
+  if (!is_late) return true;
+  if (!message.reply) return period_.count() == 0;
+  if (!missing_from_) return false;
+  const std::pair one{*entry.stamp, hash_of(entry.X)};
+  return !std::binary_search(known.told.begin(), known.told.end(), one);
+}
+
+void WatchedPartition::forget_told() {
+  for (Known& known : known_) {
+    auto& told = known.told;
+    const auto kept = missing_from_ ? std::lower_bound(told.begin(), told.end(),
+                                                       std::pair{*missing_from_, std::size_t{0}})
+                                    : told.end();
+    told.erase(told.begin(), kept);
+  }
 }
 
 void WatchedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
@@ -208,6 +237,11 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   const bool late = !begins && entry.stamp && known.newest && *entry.stamp < *known.newest;
   if (!begins && !is_news(entry, known, message, late)) return;
   known.correlation = entry.correlation;
+  if (begins || entry.cleared) known.told.clear();
+  if (missing_from_ && entry.stamp) {
+    const std::pair one{*entry.stamp, hash_of(entry.X)};
+    known.told.insert(std::upper_bound(known.told.begin(), known.told.end(), one), one);
+  }
   if (!late) {
     known.history = entry.history;
     known.commit = std::max(known.commit, message.commit);
@@ -250,6 +284,7 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (lacks_any()) return true;
   missing_from_.reset();
   if (settles(now)) missing_from_ = recent();
+  forget_told();
   return false;
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tfdude/types/partition_news.hpp"
@@ -71,6 +72,9 @@ class WatchedPartition final : public Watched {
     Correlation correlation;
     bool cleared = false;
     bool unsampled = false;
+    // Stamps, and hashes of their values, that were told while an answer may bring them again;
+    // sorted.
+    std::vector<std::pair<Time, std::size_t>> told;
   };
   struct PlannedGroup {
     std::uint64_t id = 0;
@@ -98,6 +102,8 @@ class WatchedPartition final : public Watched {
   /// The owner is reachable and has the planned frames. @return whether they or the groups are new
   [[nodiscard]] bool take_over();
   /// Whether a value of the known history is news.
+  /// Of what no answer brings again.
+  void forget_told() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool is_news(const PushedValue& entry, const Known& known, const Message& message,
                              bool is_late) const TFDUDE_REQUIRES(mutex_);
   // Appends the value if it is news.

@@ -31,8 +31,6 @@ void Forest::Impl::set_correlation(HeldVersion& fresh, InArena<EdgeCorrelation> 
 }
 
 void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
-  // The next value of an edge that drifts has the same error.
-  if (!drifts(fresh)) unlink(fresh);
   const Correlation& said = fresh.correlation->said();
   if (said.empty()) return set_correlation(fresh, nullptr);
   correlate(fresh, said);
@@ -148,12 +146,26 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
     if (edge.samples->sample(number)->commit <= seen) continue;
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
   }
+  // A value of the past is computed from the last one that was observed.
+  const Sample* later = drifts(edge) ? observed_after(edge, at) : nullptr;
+  if (later != nullptr && later->commit > seen) {
+    return fail(Errc::kChangedMeanwhile, who + " was observed at a later instant meanwhile");
+  }
   return there ? Result<void>() : check_sample(edge, at);
+}
+
+const Sample* observed_after(const HeldVersion& edge, std::int64_t t) {
+  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
+    const Sample* sample = edge.samples->sample(number);
+    if (sample == nullptr || sample->stamp <= t) break;
+    if (sample->revision() != nullptr && sample->revision()->observed) return sample;
+  }
+  return nullptr;
 }
 
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
                                  std::int64_t stamp) {
-  SampleRevision fresh{revision.X_PC, revision.correlation};
+  SampleRevision fresh{revision.X_PC, revision.correlation, true};
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
     const std::uint64_t place = samples.place_of(stamp);
@@ -202,9 +214,8 @@ void Forest::Impl::show_revision(std::uint32_t slot) {
 void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& value,
                                  std::int64_t stamp) {
   const std::int64_t span = newest.left_behind() ? 0 : newest.samples->timing().span.count();
-  // An edge without a sample has the least stamp of all.
-  const std::int64_t limit = saturating_subtract(newest.stamp, span);
-  if (!newest.limits() || stamp < limit) {
+  const bool goes_on = newest.moving() && !newest.lacks_sample();
+  if (!goes_on || stamp < saturating_subtract(newest.stamp, span)) {
     Transform X_PC = value.X_PC;
     if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
     return push_checked(newest, {X_PC}, stamp);
@@ -235,7 +246,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
-  if (is_newest) end_revision(fresh);
+  if (is_newest) end_revision(fresh, value);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
@@ -255,6 +266,13 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
     auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge, stamp, seen);
     if (!ok) return ok;
     slots.push_back(*slot);
+  }
+  // Values that a later one follows are over. This comes first, as the revisions list each other.
+  for (const std::uint32_t slot : slots) {
+    const HeldVersion& newest = impl_->frames_.newest_value(slot);
+    if (!stamp || !newest.moving() || nanoseconds(*stamp) <= newest.stamp) continue;
+    const bool revised = newest.correlation != nullptr && newest.correlation->revised();
+    if (revised && !Impl::drifts(newest)) impl_->unlink(newest);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);

@@ -14,6 +14,9 @@
 
 namespace tfdude {
 
+/// The last sample after the instant at which the edge itself was observed; null: none.
+[[nodiscard]] const Sample* observed_after(const HeldVersion& edge, std::int64_t t);
+
 /// The writer's side of Forest. It works under mutex_: it pushes versions on slots, and then
 /// commits them. It is one class, since one commit may concern structure, samples and correlations
 /// at once, and all three are pushed as one version of an edge. Separate parts are: what readers
@@ -152,8 +155,19 @@ class Forest::Impl {
   void correlate(HeldVersion& fresh, Correlation said, Correlation now) TFDUDE_REQUIRES(mutex_) {
     set_correlation(fresh, make_in<EdgeCorrelation>(*arena_, std::move(said), std::move(now)));
   }
+  [[nodiscard]] static bool drifts(const HeldVersion& edge) {
+    return edge.samples != nullptr && edge.samples->timing().drifts;
+  }
   /// Drops what an observation has set for the edge, with its value.
   void end_revision(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_) {
+    if (fresh.correlation == nullptr || !fresh.correlation->revised()) return;
+    // The next value of an edge that drifts has the same error.
+    if (!drifts(fresh)) unlink(fresh);
+    correlate_as_said(fresh);
+  }
+  /// The same for a value that an observation may give: it says itself what it is tied to.
+  void end_revision(HeldVersion& fresh, const GivenValue& by) TFDUDE_REQUIRES(mutex_) {
+    if (by.revision == nullptr) return end_revision(fresh);
     if (fresh.correlation != nullptr && fresh.correlation->revised()) correlate_as_said(fresh);
   }
   void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
@@ -209,9 +223,6 @@ class Forest::Impl {
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
-  [[nodiscard]] static bool drifts(const HeldVersion& edge) {
-    return edge.samples != nullptr && edge.samples->timing().drifts;
-  }
   void push_of_drift(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void push_checked(const HeldVersion& old, const GivenValue& value, std::int64_t stamp)

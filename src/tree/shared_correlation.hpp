@@ -93,15 +93,20 @@ class EdgeCorrelation {
 struct SampleRevision {
   Transform given;          ///< the sample before all observations
   Correlation correlation;  ///< of this sample, instead of what is said of the edge
+  bool observed = false;    ///< itself; otherwise it follows from one that was
 };
 
 /// The same, for all who read the sample.
 class SharedRevision {
  public:
   SharedRevision(Arena& arena, SampleRevision revision)
-      : given(revision.given), shared_(arena, std::move(revision.correlation)), arena_(&arena) {}
+      : given(revision.given),
+        observed(revision.observed),
+        shared_(arena, std::move(revision.correlation)),
+        arena_(&arena) {}
 
   const Transform given;
+  const bool observed;  ///< for the owner only
   [[nodiscard]] const Correlation& correlation() const { return *shared_; }
   [[nodiscard]] const FlatCorrelation* const& flat() const { return shared_.flat(); }
   [[nodiscard]] std::size_t bytes() const { return sizeof(*this) + shared_.bytes(); }

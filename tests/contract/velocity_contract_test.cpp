@@ -107,7 +107,8 @@ TEST_CASE("velocity: static edges do not move, whatever their errors are") {
     const auto still = robot.client->velocity("arm", to);
     REQUIRE(still);
     CHECK(still->linear.norm() == 0);
-    CHECK(still->covariance == StatedCovariance());
+    CHECK(still->covariance == StatedCovariance::exact());
+    CHECK(still->basis.unspecified.empty());
     CHECK_FALSE(still->begin);
     CHECK_FALSE(still->end);
   }
@@ -211,6 +212,23 @@ TEST_CASE("velocity: unspecified edges are named") {
   CHECK_FALSE(velocity->covariance.complete());
   CHECK(velocity->basis.unspecified == std::vector<std::string>{"hand"});
   CHECK((velocity->angular - Eigen::Vector3d(0, 0, 2)).norm() < 1e-9);
+}
+
+TEST_CASE("velocity: without samples it is zero, of what is specified, and of no instant") {
+  FrameSpec waits{"waits", "world", {along_x(1).pose, isotropic(1, 1)}};
+  waits.timing = EdgeTiming();
+  waits.timing->moving = true;
+  const FrameSpec loose{"loose", "world", {along_x(1).pose, StatedCovariance::unspecified()}};
+  const auto join = testing::join_loopback();
+  auto node = Node::open(join("base"), "base", {{"world", "", {}}, loose, waits}).value();
+  const auto velocity = node.velocity("world", "loose").value();
+  CHECK_FALSE(velocity.covariance.complete());
+  CHECK(velocity.basis.unspecified == std::vector<std::string>{"loose"});
+  CHECK(node.velocity("world", "waits").value().covariance.complete());
+  VelocityQuery then;
+  then.at = Time(std::chrono::seconds(1));
+  CHECK(outcome(node.velocity("world", "waits", then)) == "not_yet");
+  CHECK(node.velocity("world", "world", then));
 }
 
 }  // namespace

@@ -1,0 +1,152 @@
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/networks.hpp"
+
+// Observations that come in another order than their instants, beside a dense filter in which each
+// sample is a variable of its own. All is on one line, so that it is linear.
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::Approx;
+
+constexpr int kRounds = 30;
+constexpr double kStep = 0.1;       // [s]
+constexpr double kGrows = 0.05;     // of the drift [m²/s]
+constexpr double kPlace = 1;        // of an object [m]
+constexpr double kSighting = 0.01;  // [m]
+
+Covariance on_line(double variance) {
+  Covariance::Upper upper{};
+  upper[0] = variance;
+  return Covariance::trusted(upper);
+}
+
+Time at(int step) { return Time(std::chrono::milliseconds(100 * (step + 1))); }
+
+std::string name_of(int object) { return object == 0 ? "near" : "far"; }
+
+// world -> base drifts; world -> near and world -> far stand.
+class Line {
+ public:
+  explicit Line(int steps) : sigma_(Eigen::MatrixXd::Zero(steps + 2, steps + 2)), steps_(steps) {
+    FrameSpec base{"base", "world", Transform::exact({})};
+    base.timing = EdgeTiming();
+    base.timing->drifts = true;
+    base.timing->process_noise = on_line(kGrows);
+    const Transform somewhere{along_x(1).pose, on_line(kPlace * kPlace)};
+    node_.emplace(
+        Node::open(
+            network_.join(), "robot",
+            {{"world", "", {}}, base, {"near", "world", somewhere}, {"far", "world", somewhere}})
+            .value());
+    for (int i = 0; i < steps; ++i) {
+      for (int j = 0; j < steps; ++j) sigma_(i, j) = kGrows * kStep * std::min(i, j);
+    }
+    sigma_(steps, steps) = sigma_(steps + 1, steps + 1) = kPlace * kPlace;
+  }
+
+  void drive(int step) { REQUIRE(node_->update("base", Transform::exact({}), at(step))); }
+
+  // Sees what it expects, so that only covariances change.
+  void see(int object, int step) {
+    const std::string id = name_of(object);
+    Query query;
+    query.at = at(step);
+    const auto X = node_->lookup("base", id, query);
+    REQUIRE(X);
+    const auto found =
+        node_->observe("base", id, {X->pose, on_line(kSighting * kSighting)}, at(step));
+    REQUIRE(found);
+    REQUIRE(found->accepted);
+    Eigen::VectorXd H = Eigen::VectorXd::Zero(sigma_.rows());
+    H(steps_ + object) = 1;
+    H(step) = -1;
+    const Eigen::VectorXd gain = sigma_ * H / (H.dot(sigma_ * H) + kSighting * kSighting);
+    sigma_ -= (gain * (H.transpose() * sigma_)).eval();
+  }
+
+  // The variance that a lookup at the newest sample has, by that of the dense filter.
+  double ratio(const std::string& from, int object, int newest) {
+    Eigen::VectorXd H = Eigen::VectorXd::Zero(sigma_.rows());
+    H(steps_ + object) = 1;
+    if (from == "base") H(newest) = -1;
+    const auto X = node_->lookup(from, name_of(object), Query{}).value();
+    return X.covariance.of_specified().upper()[0] / H.dot(sigma_ * H);
+  }
+
+ private:
+  LoopbackNetwork network_;
+  std::optional<Node> node_;
+  Eigen::MatrixXd sigma_;  // of the base at each step, and of the objects
+  int steps_;
+};
+
+}  // namespace
+
+TEST_CASE("late observations: in the order of their instants they are exact") {
+  Line line(kRounds + 1);
+  line.drive(0);
+  for (int step = 1; step <= kRounds; ++step) {
+    line.drive(step);
+    line.see(1, step - 1);
+    line.see(0, step);
+  }
+  for (const int object : {0, 1}) {
+    CHECK(line.ratio("world", object, kRounds) == Approx(1).margin(1e-6));
+    CHECK(line.ratio("base", object, kRounds) == Approx(1).margin(1e-6));
+  }
+}
+
+TEST_CASE("late observations: out of order they never get overconfident") {
+  const int late = GENERATE(1, 2, 5);
+  CAPTURE(late);
+  Line line(kRounds + 1);
+  for (int step = 0; step < late; ++step) line.drive(step);
+  for (int step = late; step <= kRounds; ++step) {
+    line.drive(step);
+    line.see(0, step);
+    line.see(1, step - late);
+    line.see(0, step - late);
+  }
+  for (const int object : {0, 1}) {
+    CAPTURE(object, line.ratio("world", object, kRounds), line.ratio("base", object, kRounds));
+    CHECK(line.ratio("world", object, kRounds) > 0.95);
+    CHECK(line.ratio("base", object, kRounds) > 0.95);
+  }
+}
+
+TEST_CASE("late observations: what a dynamic edge was observed with stays with it") {
+  const bool drifts = GENERATE(false, true);
+  CAPTURE(drifts);
+  const Transform X{along_x(0).pose, on_line(0.01)};
+  FrameSpec moves{"moves", "world", X};
+  moves.timing = EdgeTiming();
+  moves.timing->moving = true;
+  moves.timing->drifts = drifts;
+  LoopbackNetwork network;
+  auto node =
+      Node::open(network.join(), "robot",
+                 {{"world", "", {}}, moves, {"tip", "moves", {along_x(1).pose, on_line(0.01)}}})
+          .value();
+  REQUIRE(node.update("moves", X, at(0)));
+  REQUIRE(node.observe("world", "tip", {along_x(1).pose, on_line(1e-6)}));
+  for (int i = 0; i < 4; ++i) {
+    const auto found = node.observe("moves", "tip", {along_x(1.01).pose, on_line(0.0025)}).value();
+    CHECK(found.corrected.size() == 2);
+    const auto tip = node.lookup("world", "tip", Query{}).value();
+    CHECK(tip.pose.translation().x() == Approx(1).margin(1e-5));
+    CHECK(tip.covariance.of_specified().upper()[0] == Approx(1e-6).epsilon(1e-3));
+  }
+}
+
+}  // namespace tfdude
