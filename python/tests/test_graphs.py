@@ -251,6 +251,18 @@ def test_a_tree_is_written_as_a_graph(tmp_path, network):
             assert np.allclose(again.lookup(back[a].id + "2", back[b].id + "2").matrix, X.matrix, atol=1e-12)
 
 
+def test_a_written_tree_whose_root_is_named_map_is_read_again(tmp_path, network):
+    X = Transform((1, 2, 0), covariance=np.eye(6) * 1e-4)
+    file = tmp_path / "map.g2o"
+    file.write_text(tfdude.write_frames([FrameSpec("odom", "map", X), FrameSpec("base", "odom", X)], "g2o"))
+    for names, root in (({}, "map"), ({"map": "world"}, "world")):
+        read = tfdude.read_frames(str(file), names=names)
+        assert [(frame.id, frame.parent) for frame in read] == [("odom", root), ("base", root)]
+    file.write_text("# frame 0 map\nVERTEX_SE3:QUAT 0 1 0 0 0 0 0 1\n")
+    with pytest.raises(tfdude.TransformException, match="below itself"):
+        tfdude.read_frames(str(file))
+
+
 def test_graphs_that_are_no_solution_or_not_determined(tmp_path):
     graph = Graph(7)
     vertex = [line for line in graph.text().splitlines() if line.startswith("VERTEX")]

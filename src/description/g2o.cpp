@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/math/perturbation.hpp"
 
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
@@ -87,12 +88,20 @@ class Reader {
         edge.frame.X_PC.covariance = errors[i].own;
         edge.frame.correlation.common_errors = std::move(errors[i].common_errors);
       }
-      edges.push_back(std::move(edge));
+      if (!is_parent_itself(edge.frame)) edges.push_back(std::move(edge));
     }
     return edges;
   }
 
  private:
+  // A vertex of the parent's name that stands exactly there, as the root of a written tree does.
+  [[nodiscard]] static bool is_parent_itself(const FrameSpec& frame) {
+    const Transform& X = frame.X_PC;
+    return frame.id == frame.parent && log(X.pose).isZero(0) &&
+           X.covariance.of_specified().matrix().isZero(0) &&
+           frame.correlation.common_errors.empty();
+  }
+
   [[nodiscard]] tl::unexpected<Error> error(const std::string& message) const {
     return file_error(Errc::kInvalidInput, name_, line_, message);
   }
