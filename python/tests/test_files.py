@@ -279,6 +279,22 @@ def test_static_transform_publisher_in_python_and_shell(tmp_path):
     check(frames["base"], "odom", pose([2, 0, 0], np.eye(3)))
 
 
+def test_every_start_of_a_shell_script_is_read(tmp_path):
+    run = "ros2 run tf2_ros static_transform_publisher"
+    script = f"""source setup.bash && {run} 1 0 0 0 0 0 map a &
+{run} 2 0 0 0 0 0 map b & {run} 3 0 0 0 0 0 map c &
+sleep 1; {run} 4 0 0 0 0 0 map d > /dev/null 2>&1 &
+echo "starting static_transform_publisher"  # {run} 5 0 0 0 0 0 map none
+{run} --x 6 --frame-id map \\
+  --child-frame-id 'e' 2>log &>>log
+"""
+    frames = read(tmp_path, script)
+    assert {id: frame.X_PC.translation[0] for id, frame in frames.items()} == {"a": 1, "b": 2, "c": 3, "d": 4, "e": 6}
+    assert message(tmp_path, f"if true; then\n{run} 1 0 0 0 0 0 map a\nfi\n") == (
+        "file:2: static_transform_publisher is started under a condition, or in a loop: write what happens")
+    assert list(read(tmp_path, f"for i in 1 2; do sleep 1; done\n{run} 1 0 0 0 0 0 map a\n")) == ["a"]
+
+
 def test_opencv_maps_the_first_camera_to_the_second(tmp_path):
     frames = read(tmp_path, OPENCV, unit=1e-3, names={"left": "cam_l", "right": "cam_r"})
     expected = np.array(T_1_0)

@@ -2,8 +2,9 @@
 // and shell scripts.
 
 #include <algorithm>
-#include <cstring>
+#include <initializer_list>
 #include <map>
+#include <regex>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -203,10 +204,50 @@ Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::str
   return starts;
 }
 
-// The lines of a shell script that start the program, each up to its ampersand or comment.
-std::vector<Start> starts_in_shell(const std::string& text) {
+// The simple commands of a line of a shell script, up to a comment: what ; & and | divide outside
+// of quotes. The ampersands of redirections do not.
+std::vector<std::string> shell_commands(const std::string& line) {
+  std::vector<std::string> commands(1);
+  char quote = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    const char before = i > 0 ? line[i - 1] : ' ';
+    const bool redirects = c == '&' && (before == '>' || line.compare(i + 1, 1, ">") == 0);
+    if (quote == 0 && c == '#' && (before == ' ' || before == '\t')) break;
+    if (c == quote) {
+      quote = 0;
+    } else if (quote == 0 && (c == '"' || c == '\'')) {
+      quote = c;
+    }
+    if (quote == 0 && (c == ';' || c == '&' || c == '|') && !redirects) {
+      commands.emplace_back();
+    } else {
+      commands.back() += c;
+    }
+  }
+  return commands;
+}
+
+std::string without_redirections(const std::string& command) {
+  static const std::regex kRedirection("([0-9]*|&)>+(&[0-9]|[ \t]*[^ \t]+)|<[ \t]*[^ \t]+");
+  return std::regex_replace(command, kRedirection, " ");
+}
+
+// How many more blocks a command begins than it ends: conditions and loops.
+int opened_by(const Words& command) {
+  const auto is_one_of = [&](std::initializer_list<const char*> words) {
+    return !command.empty() &&
+           std::find(words.begin(), words.end(), command.front()) != words.end();
+  };
+  if (is_one_of({"if", "for", "while", "until", "case"})) return 1;
+  return is_one_of({"fi", "done", "esac"}) ? -1 : 0;
+}
+
+// The commands of a shell script that start the program.
+Result<std::vector<Start>> starts_in_shell(const std::string& text, const std::string& name) {
   std::vector<Start> starts;
   TextLines lines(text);
+  int blocks = 0;
   while (lines.next()) {
     const int number = lines.number();
     std::string line(lines.line());
@@ -216,19 +257,25 @@ std::vector<Start> starts_in_shell(const std::string& text) {
       if (!lines.next()) break;
       line += lines.line();
     }
-    line.resize(std::min({line.find('#'), line.find('&'), line.find(';'), line.size()}));
-    const std::size_t at = line.find(kProgram);
-    if (at == std::string::npos) continue;
-    Start start{{}, false, number};
-    const Words before = split(line.substr(0, at));
-    start.of_tf = !before.empty() && before.back() == "tf";
-    for (std::string word : split(line.substr(at + std::strlen(kProgram)))) {
-      word.erase(
-          std::remove_if(word.begin(), word.end(), [](char c) { return c == '"' || c == '\''; }),
-          word.end());
-      start.words.push_back(std::move(word));
+    for (const std::string& command : shell_commands(" " + line)) {
+      Words words = split(without_redirections(command));
+      blocks += opened_by(words);
+      const auto program = std::find(words.begin(), words.end(), kProgram);
+      if (program == words.end()) continue;
+      if (blocks > 0) {
+        return file_error(Errc::kInvalidInput, name, number,
+                          std::string(kProgram) +
+                              " is started under a condition, or in a loop: write what happens");
+      }
+      Start start{{}, program != words.begin() && *(program - 1) == "tf", number};
+      for (auto word = program + 1; word != words.end(); ++word) {
+        word->erase(std::remove_if(word->begin(), word->end(),
+                                   [](char c) { return c == '"' || c == '\''; }),
+                    word->end());
+        start.words.push_back(std::move(*word));
+      }
+      starts.push_back(std::move(start));
     }
-    starts.push_back(std::move(start));
   }
   return starts;
 }
@@ -245,7 +292,7 @@ Result<std::vector<Start>> starts_of(const std::string& text, const std::string&
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] == '<') return starts_in_xml(text, name);
   if (text.find("LaunchDescription") != std::string::npos) return starts_in_python(text, name);
-  return starts_in_shell(text);
+  return starts_in_shell(text, name);
 }
 
 }  // namespace
