@@ -279,6 +279,16 @@ def test_static_transform_publisher_in_python_and_shell(tmp_path):
     check(frames["base"], "odom", pose([2, 0, 0], np.eye(3)))
 
 
+def test_a_launch_file_in_python_decides_nothing(tmp_path):
+    def launched(more):
+        return message(tmp_path, f"LaunchDescription([Node(package='tf2_ros', "
+                                 f"executable='static_transform_publisher', {more})])\n")
+
+    assert launched("condition=IfCondition('false'), arguments=['1', '2', '3', '0', '0', '0', 'map', 'a']") == (
+        "file:1: static_transform_publisher is started under a condition: write what happens")
+    assert launched("**common") == "file:1: static_transform_publisher has no arguments here: write them there"
+
+
 def test_every_start_of_a_shell_script_is_read(tmp_path):
     run = "ros2 run tf2_ros static_transform_publisher"
     script = f"""source setup.bash && {run} 1 0 0 0 0 0 map a &

@@ -119,19 +119,33 @@ class Calls {
                                                               std::size_t named) const {
     if (is(open, "[")) return items(named + 2, tokens_[open].other);  // after the comma
     if (!is(open, "(")) return std::nullopt;
+    std::optional<std::size_t> arguments;
     for (std::size_t i = open + 1; i < tokens_[open].other; ++i) {
       if (is(i, "(") || is(i, "[") || is(i, "{")) {
         i = tokens_[i].other;
-      } else if (!is_string(i) && tokens_[i].text == "arguments" && is(i + 1, "=")) {
-        return value(i + 2);
+      } else if (is_keyword(i, "condition")) {
+        return file_error(
+            Errc::kInvalidInput, file_, tokens_[i].line,
+            tokens_[named].text + " is started under a condition: write what happens");
+      } else if (is_keyword(i, "arguments")) {
+        arguments = i + 2;
       }
     }
-    return std::nullopt;
+    if (arguments) return value(*arguments);
+    // Elsewhere than as the program of a node it is only a word.
+    if (named < 2 || !(is_keyword(named - 2, "executable") || is_keyword(named - 2, "exec"))) {
+      return std::nullopt;
+    }
+    return file_error(Errc::kInvalidInput, file_, tokens_[named].line,
+                      tokens_[named].text + " has no arguments here: write them there");
   }
 
  private:
   [[nodiscard]] bool is(std::size_t i, std::string_view sign) const {
     return i < tokens_.size() && tokens_[i].kind == Token::Kind::kSign && tokens_[i].text == sign;
+  }
+  [[nodiscard]] bool is_keyword(std::size_t i, std::string_view name) const {
+    return !is_string(i) && tokens_[i].text == name && is(i + 1, "=");
   }
   [[nodiscard]] bool is_string(std::size_t i) const {
     return i < tokens_.size() && tokens_[i].kind == Token::Kind::kString;
