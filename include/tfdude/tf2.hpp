@@ -64,6 +64,9 @@ class Buffer {
     const Query at_target = query(tf2::detail::nanoseconds_of(target_time));
     const Query at_source = query(tf2::detail::nanoseconds_of(source_time));
     const Milliseconds wait = milliseconds(tf2::detail::nanoseconds_of(timeout));
+    for (const std::string* frame : {&target, &source, &fixed}) {
+      if (name(*frame).empty()) tf2::detail::raise(no_frame());
+    }
     auto X = client().lookup(name(target), at_target, name(source), at_source, name(fixed), wait);
     if (!X) tf2::detail::raise(X.error());
     if (at_target.at) X->stamp = at_target.at;
@@ -136,9 +139,9 @@ class Buffer {
   /// ROS 1 had a leading slash, and some nodes still do.
   [[nodiscard]] static std::string name(const std::string& frame) {
     const std::size_t begin = frame.find_first_not_of('/');
-    if (begin == std::string::npos) throw tf2::InvalidArgumentException("an empty frame id");
-    return frame.substr(begin);
+    return begin == std::string::npos ? std::string() : frame.substr(begin);
   }
+  [[nodiscard]] static Error no_frame() { return {Errc::kInvalidInput, "an empty frame id"}; }
   [[nodiscard]] static Query query(tf2::Duration at) {
     Query query;
     if (at.count() != 0) query.at = Time(at);
@@ -156,7 +159,10 @@ class Buffer {
   [[nodiscard]] Result<StampedTransform> look_up(const std::string& target,
                                                  const std::string& source, tf2::Duration at,
                                                  tf2::Duration timeout) const {
-    return source_->lookup(name(target), name(source), query(at), milliseconds(timeout));
+    const std::string a = name(target);
+    const std::string b = name(source);
+    if (a.empty() || b.empty()) return tl::unexpected(no_frame());
+    return source_->lookup(a, b, query(at), milliseconds(timeout));
   }
 
   // A static transform holds for the time that was asked for.

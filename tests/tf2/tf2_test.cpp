@@ -145,6 +145,15 @@ TEST_CASE("tf2: exceptions have tf2's names") {
   CHECK(buffer.canTransform("map", "follower", tf2::timeFromSec(10.25), tf2::Duration(), &why));
   CHECK(buffer._frameExists("leader"));
   CHECK_FALSE(buffer._frameExists("nobody"));
+  // A message without a frame.
+  for (const char* none : {"", "/"}) {
+    why.clear();
+    CHECK_FALSE(buffer.canTransform("map", none, tf2::TimePointZero, &why));
+    CHECK_FALSE(why.empty());
+    CHECK_FALSE(buffer._frameExists(none));
+    CHECK_THROWS_AS((void)buffer.lookupTransform("map", none, tf2::TimePointZero),
+                    tf2::InvalidArgumentException);
+  }
   CHECK(buffer.getAllFrameNames().size() == 4);
 }
 
