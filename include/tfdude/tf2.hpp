@@ -64,10 +64,11 @@ class Buffer {
     const Query at_target = query(tf2::detail::nanoseconds_of(target_time));
     const Query at_source = query(tf2::detail::nanoseconds_of(source_time));
     const Milliseconds wait = milliseconds(tf2::detail::nanoseconds_of(timeout));
-    for (const std::string* frame : {&target, &source, &fixed}) {
-      if (name(*frame).empty()) tf2::detail::raise(no_frame());
-    }
-    auto X = client().lookup(name(target), at_target, name(source), at_source, name(fixed), wait);
+    const std::string a = name(target);
+    const std::string b = name(source);
+    const std::string c = name(fixed);
+    if (a.empty() || b.empty() || c.empty()) tf2::detail::raise(no_frame());
+    auto X = client().lookup(a, at_target, b, at_source, c, wait);
     if (!X) tf2::detail::raise(X.error());
     if (at_target.at) X->stamp = at_target.at;
     return message(target, source, *X, Time());

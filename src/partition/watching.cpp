@@ -140,8 +140,9 @@ std::vector<EdgeCursor> WatchedGroup::fresh_cursors() const {
 }
 
 void WatchedGroup::begin(const PushedValues& told) {
+  for (EdgeCursor& edge : cursors_) edge.commit = told.commit;
   const auto newest = told.entries.empty() ? std::nullopt : told.entries.back().stamp;
-  begun_ = SeenSegments{told.commit, newest.value_or(Time::min()), false};
+  begun_ = {told.commit, newest.value_or(Time::min()), false};
 }
 
 Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
@@ -184,9 +185,7 @@ Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time>
 PushedValues WatchedGroup::changed(const Forest& forest) {
   if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  PushedQuery query{newest_only, {}, true, request_.of_samples};
-  if (begun_) query.after = begun_->commit;
-  auto found = forest.values_since(cursors_, query);
+  auto found = forest.values_since(cursors_, {newest_only, {}, true, request_.of_samples});
   PushedValues pushed{id_, std::move(found.values), told_, found.commit};
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;
@@ -241,9 +240,9 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   PushedValues pushed{id_, {}, told_, told_};
   const auto& before = sent_.front();
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
-  SeenSegments seen{told_, Time::min(), newest_only || (!before && !begun_)};
-  if (!before && begun_) seen = {begun_->commit, begun_->until, newest_only};
-  if (before && before->stamp) seen.until = *before->stamp;
+  SeenSegments seen = begun_;
+  if (before) seen = {told_, before->stamp.value_or(Time::min()), false};
+  seen.newest_only = seen.newest_only || newest_only;
   const std::size_t most = kMaxItems / request_.segments.size();
   auto all = forest.segments_since(request_.segments, seen, most);
   // Of another history, the watchers have nothing.

@@ -92,8 +92,9 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::uint64_t told_ = 0;                        // commit of the last push
-  std::optional<SeenSegments> begun_;             // what the first watcher was told
+  std::uint64_t told_ = 0;  // commit of the last push
+  // What the first watcher was told of composed segments.
+  SeenSegments begun_{0, Time::min(), true};
   std::vector<EdgeCursor> cursors_;               // by edge
   std::vector<std::optional<PushedValue>> sent_;  // by composed segment
   CovarianceNumbers numbers_;

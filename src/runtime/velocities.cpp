@@ -81,25 +81,13 @@ class EdgesTask final : public Task {
 
 }  // namespace
 
-Result<std::optional<Velocities::Interval>> Velocities::interval(const std::string& a,
-                                                                 const std::string& b,
-                                                                 const VelocityQuery& query,
-                                                                 const Deadline& deadline) {
-  if (query.over <= std::chrono::nanoseconds(0)) {
-    return fail(Errc::kInvalidInput,
-                "the interval of a velocity must be positive, not " + in_milliseconds(query.over));
-  }
-  if (auto ok = check_stamp(query.at); !ok) return tl::unexpected(std::move(ok.error()));
-  const auto newest = lookups_.lookup<std::string_view>(a, b, {}, deadline);
-  if (!newest) return tl::unexpected(newest.error());
-  if (!newest->stamp) return std::nullopt;
-  Time end = *newest->stamp;
+Result<Velocities::Interval> Velocities::interval(const std::string& a, const std::string& b,
+                                                  const VelocityQuery& query, Time newest,
+                                                  const Deadline& deadline) {
+  Time end = newest;
   if (query.at) {
     if (*query.at > end) {
-      Query then;
-      then.at = query.at;
-      const auto at = lookups_.lookup<std::string_view>(a, b, then, deadline);
-      if (!at) return tl::unexpected(at.error());
+      if (auto at = lookup(a, b, query.at, deadline); !at) return tl::unexpected(at.error());
     }
     end = std::min(std::max(end, *query.at), later_by(*query.at, query.over / 2));
   }
@@ -109,21 +97,35 @@ Result<std::optional<Velocities::Interval>> Velocities::interval(const std::stri
                                  " before the clock starts");
 }
 
+Result<StampedTransform> Velocities::lookup(const std::string& a, const std::string& b,
+                                            const std::optional<Time>& at,
+                                            const Deadline& deadline) {
+  Query query;
+  query.at = at;
+  return lookups_.lookup<std::string_view>(a, b, query, deadline);
+}
+
 Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b,
                                       const VelocityQuery& query, const Deadline& deadline) {
-  const auto interval = this->interval(a, b, query, deadline);
-  if (!interval) return tl::unexpected(interval.error());
-  if (!*interval) {  // no edge has samples
-    Query at;
-    at.at = query.at;
-    auto X_AB = lookups_.lookup<std::string_view>(a, b, at, deadline);
-    if (!X_AB) return tl::unexpected(std::move(X_AB.error()));
+  if (query.over <= std::chrono::nanoseconds(0)) {
+    return fail(Errc::kInvalidInput,
+                "the interval of a velocity must be positive, not " + in_milliseconds(query.over));
+  }
+  if (auto ok = check_stamp(query.at); !ok) return tl::unexpected(std::move(ok.error()));
+  auto newest = lookup(a, b, {}, deadline);
+  // No edge has samples: what was not sampled yet is nowhere at an instant.
+  const bool rests = newest && !newest->stamp;
+  if (rests && query.at) newest = lookup(a, b, query.at, deadline);
+  if (!newest) return tl::unexpected(std::move(newest.error()));
+  if (rests) {
     Velocity rest;
-    rest.basis.unspecified = std::move(X_AB->basis.unspecified);
+    rest.basis.unspecified = std::move(newest->basis.unspecified);
     rest.covariance.set_complete(rest.basis.unspecified.empty());
     return rest;
   }
-  const Interval& ends = **interval;
+  const auto interval = this->interval(a, b, query, *newest->stamp, deadline);
+  if (!interval) return tl::unexpected(interval.error());
+  const Interval& ends = *interval;
   EdgesTask task(structure_.forest, a, b, ends.begin, ends.end);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
   const std::vector<EdgeAtEnds>& edges = task.edges();

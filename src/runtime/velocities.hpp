@@ -27,10 +27,13 @@ class Velocities {
     Time end;
   };
 
-  /// Empty: the path is static.
-  [[nodiscard]] Result<std::optional<Interval>> interval(const std::string& a, const std::string& b,
-                                                         const VelocityQuery& query,
-                                                         const Deadline& deadline);
+  /// @param newest  the latest common time of the path
+  [[nodiscard]] Result<Interval> interval(const std::string& a, const std::string& b,
+                                          const VelocityQuery& query, Time newest,
+                                          const Deadline& deadline);
+  [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
+                                                const std::optional<Time>& at,
+                                                const Deadline& deadline);
 
   Structure& structure_;
   Requests& requests_;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 #include <map>
-#include <string_view>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -28,16 +27,12 @@ void spread_correlations(std::vector<PushedValue>& entries) {
 }
 
 std::size_t hash_of(const Transform& X) {
-  const std::hash<std::string_view> hash;
-  const auto bytes = [](const double* first, std::size_t count) {
-    // NOLINTNEXTLINE(*-reinterpret-cast): the bytes of numbers
-    return std::string_view(reinterpret_cast<const char*>(first), count * sizeof(double));
-  };
-  const Covariance::Upper& upper = X.covariance.of_specified().upper();
-  const Eigen::Vector3d xyz = X.pose.translation();
-  const Eigen::Quaterniond q = X.pose.rotation();
-  return hash(bytes(xyz.data(), 3)) ^ (31 * hash(bytes(q.coeffs().data(), 4))) ^
-         (37 * hash(bytes(upper.data(), upper.size())));
+  std::size_t hash = 0;
+  const auto add = [&hash](double number) { hash = 31 * hash + std::hash<double>()(number); };
+  const Eigen::Matrix4d pose = X.pose.matrix();
+  for (const double number : pose.reshaped()) add(number);
+  for (const double number : X.covariance.of_specified().upper()) add(number);
+  return hash;
 }
 
 // For each frame of `from` its index in `to`, if it has the same parent there.
@@ -209,16 +204,16 @@ bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, con
   if (!is_late) return true;
   if (!message.reply) return period_.count() == 0;
   if (!missing_from_) return false;
-  const std::pair one{*entry.stamp, hash_of(entry.X)};
+  const Known::Told one{*entry.stamp, hash_of(entry.X)};
   return !std::binary_search(known.told.begin(), known.told.end(), one);
 }
 
 void WatchedPartition::forget_told() {
   for (Known& known : known_) {
     auto& told = known.told;
-    const auto kept = missing_from_ ? std::lower_bound(told.begin(), told.end(),
-                                                       std::pair{*missing_from_, std::size_t{0}})
-                                    : told.end();
+    const auto kept =
+        missing_from_ ? std::lower_bound(told.begin(), told.end(), Known::Told{*missing_from_, 0})
+                      : told.end();
     told.erase(told.begin(), kept);
   }
 }
@@ -239,7 +234,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   known.correlation = entry.correlation;
   if (begins || entry.cleared) known.told.clear();
   if (missing_from_ && entry.stamp) {
-    const std::pair one{*entry.stamp, hash_of(entry.X)};
+    const Known::Told one{*entry.stamp, hash_of(entry.X)};
     known.told.insert(std::upper_bound(known.told.begin(), known.told.end(), one), one);
   }
   if (!late) {
@@ -282,6 +277,7 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
   if (lacks_any()) return true;
+  if (!missing_from_ && !settles(now)) return false;
   missing_from_.reset();
   if (settles(now)) missing_from_ = recent();
   forget_told();

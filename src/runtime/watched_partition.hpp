@@ -72,9 +72,8 @@ class WatchedPartition final : public Watched {
     Correlation correlation;
     bool cleared = false;
     bool unsampled = false;
-    // Stamps, and hashes of their values, that were told while an answer may bring them again;
-    // sorted.
-    std::vector<std::pair<Time, std::size_t>> told;
+    using Told = std::pair<Time, std::size_t>;  // a stamp, and the hash of its value
+    std::vector<Told> told;                     // while an answer may bring it again; sorted
   };
   struct PlannedGroup {
     std::uint64_t id = 0;
@@ -101,9 +100,9 @@ class WatchedPartition final : public Watched {
   [[nodiscard]] std::vector<Watched::Group> group();
   /// The owner is reachable and has the planned frames. @return whether they or the groups are new
   [[nodiscard]] bool take_over();
-  /// Whether a value of the known history is news.
-  /// Of what no answer brings again.
+  /// Drops from what was told what no answer brings again.
   void forget_told() TFDUDE_REQUIRES(mutex_);
+  /// Whether a value of the known history is news.
   [[nodiscard]] bool is_news(const PushedValue& entry, const Known& known, const Message& message,
                              bool is_late) const TFDUDE_REQUIRES(mutex_);
   // Appends the value if it is news.

@@ -6,14 +6,6 @@
 
 // Watched paths that are read in the memory of their owners.
 namespace tfdude {
-namespace {
-
-bool is_same(const StampedTransform& X, const StampedTransform& Y) {
-  return X.stamp == Y.stamp && X.pose.translation() == Y.pose.translation() &&
-         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs() && X.covariance == Y.covariance;
-}
-
-}  // namespace
 
 bool WatchedPath::read_memory(Clock::time_point now) {
   bool rerouted = false;
@@ -74,7 +66,8 @@ Watched::Looked WatchedPath::look(Clock::time_point now) {
     const bool begins = !std::exchange(written_, written);
     auto newest = memory->lookup_kept(a_, b_, {});
     // What a mirror has shown before is not new.
-    const bool known = begins && newest && newest_ && is_same(*newest, *newest_);
+    const bool known =
+        begins && newest && newest_ && newest->stamp == newest_->stamp && same(*newest, *newest_);
     remember(std::move(newest));
     if (known) return {};
     messages_.fetch_add(1, std::memory_order_relaxed);

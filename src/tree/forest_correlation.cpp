@@ -30,7 +30,10 @@ void Forest::Impl::set_correlation(HeldVersion& fresh, InArena<EdgeCorrelation> 
   fresh.correlation = correlation.release();
 }
 
-void Forest::Impl::correlate_as_said(HeldVersion& fresh) {
+void Forest::Impl::end_revision(HeldVersion& fresh, const SampleRevision* by) {
+  if (fresh.correlation == nullptr || !fresh.correlation->revised()) return;
+  // The next value of an edge that drifts has the same error.
+  if (by == nullptr && !drifts(fresh)) unlink(fresh);
   const Correlation& said = fresh.correlation->said();
   if (said.empty()) return set_correlation(fresh, nullptr);
   correlate(fresh, said);
@@ -246,7 +249,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
-  if (is_newest) end_revision(fresh, value);
+  if (is_newest) end_revision(fresh, value.revision);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;

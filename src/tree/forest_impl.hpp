@@ -159,18 +159,9 @@ class Forest::Impl {
     return edge.samples != nullptr && edge.samples->timing().drifts;
   }
   /// Drops what an observation has set for the edge, with its value.
-  void end_revision(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_) {
-    if (fresh.correlation == nullptr || !fresh.correlation->revised()) return;
-    // The next value of an edge that drifts has the same error.
-    if (!drifts(fresh)) unlink(fresh);
-    correlate_as_said(fresh);
-  }
-  /// The same for a value that an observation may give: it says itself what it is tied to.
-  void end_revision(HeldVersion& fresh, const GivenValue& by) TFDUDE_REQUIRES(mutex_) {
-    if (by.revision == nullptr) return end_revision(fresh);
-    if (fresh.correlation != nullptr && fresh.correlation->revised()) correlate_as_said(fresh);
-  }
-  void correlate_as_said(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
+  /// @param by  the observation that gives the next value, if one does: it says itself what that is
+  ///   tied to
+  void end_revision(HeldVersion& fresh, const SampleRevision* by = nullptr) TFDUDE_REQUIRES(mutex_);
   /// The edges that were observed with this one are not correlated with its next value.
   void unlink(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   /// Makes the row of a dynamic edge's newest sample that of the edge.

@@ -69,7 +69,7 @@ std::uint64_t first_to_tell(const HeldVersion& edge, const EdgeCursor& cursor, s
                             const PushedQuery& query) {
   const SampleHistory& samples = *edge.samples;
   std::uint64_t first = edge.number;
-  if (cursor.history == 0 && !query.after) {
+  if (cursor.history == 0 && cursor.commit == 0) {
     const std::int64_t from = query.from ? nanoseconds(*query.from) : edge.stamp;
     while (first > samples.oldest() && samples.stamp(first) > from) --first;
     return first;
@@ -216,7 +216,7 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
   } else if (edge.moving() && query.newest_only) {
     telling.tell_newest(seen);
   } else if (edge.moving()) {
-    const std::uint64_t told = cursor.history == 0 ? query.after.value_or(0) : seen;
+    const std::uint64_t told = cursor.history == 0 ? cursor.commit : seen;
     telling.tell_samples(first_to_tell(edge, cursor, told, query), told);
     if (begins) telling.tell_newest_if_none();
   } else if (edge.commit > seen) {

@@ -249,37 +249,35 @@ constexpr double kUntied = 3;
 // The value of an edge that drifts, at an instant before the last one at which it was observed: as
 // it follows from there, backwards, with what may have been added on the way. Its sample of that
 // instant is not tied any more to what was observed since.
-bool tell_as_observed_later(const HeldVersion& edge, std::int64_t t, std::size_t i,
-                            SegmentValues& found) {
-  if (!edge.samples->timing().drifts) return false;
+std::optional<CorrelatedValue> as_observed_later(const HeldVersion& edge, std::int64_t t) {
+  if (!edge.samples->timing().drifts) return std::nullopt;
   const Sample* later = observed_after(edge, t);
   std::uint64_t back = 0;
   const auto around = edge.samples->around(t, edge.number, back);
-  if (later == nullptr || around.before == nullptr) return false;
+  if (later == nullptr || around.before == nullptr) return std::nullopt;
   Pose G_PC = given(*around.before).pose;
   if (around.before->stamp != t) {
-    if (around.after == nullptr) return false;
+    if (around.after == nullptr) return std::nullopt;
     const double s = static_cast<double>(t - around.before->stamp) /
                      static_cast<double>(around.after->stamp - around.before->stamp);
     interpolate(given(*around.before).pose, given(*around.after).pose, s, G_PC);
   }
   const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
-  auto [X_PC, correlation] = drifted(*later, said, G_PC, edge.samples->timing().process_noise,
-                                     kUntied * static_cast<double>(later->stamp - t) * 1e-9);
-  PathCorrelation& told = found.correlations[i];
-  told.unknown.reset();
-  if (correlation.unknown) {
-    const bool complete = X_PC.covariance.complete();
-    told.unknown = X_PC.covariance.of_specified();
-    X_PC.covariance = Covariance();
-    X_PC.covariance.set_complete(complete);
-  }
-  told.common_errors = std::move(correlation.common_errors);
-  std::copy_if(correlation.observed_with.begin(), correlation.observed_with.end(),
-               std::back_inserter(told.observed_with),
-               [&](const std::string& id) { return id != edge.name->text; });
-  found.values[i] = X_PC;
-  return true;
+  return drifted(*later, said, G_PC, edge.samples->timing().process_noise,
+                 kUntied * static_cast<double>(later->stamp - t) * 1e-9);
+}
+
+void set_value(SegmentValues& found, std::size_t i, const CorrelatedValue& value) {
+  found.values[i] = value.X_PC;
+  PathCorrelation& correlation = found.correlations[i];
+  correlation.common_errors = value.correlation.common_errors;
+  correlation.unknown.reset();
+  if (!value.correlation.unknown) return;
+  StatedCovariance& own = found.values[i].covariance;
+  const bool complete = own.complete();
+  correlation.unknown = own.of_specified();
+  own = Covariance();
+  own.set_complete(complete);
 }
 
 // Adds the edges that each single edge was observed with. A dynamic edge is listed with itself
@@ -299,8 +297,9 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
       with.assign(edge->samples->timing().drifts ? 3 : 2, std::string(edge->name->text));
       if (!found.stamp) continue;
       const std::int64_t t = nanoseconds(*found.stamp);
-      if (tell_as_observed_later(*edge, t, i, found)) continue;
-      const Correlation* row = row_at(*edge, t);
+      const auto value = as_observed_later(*edge, t);
+      if (value) set_value(found, i, *value);
+      const Correlation* row = value ? &value->correlation : row_at(*edge, t);
       if (row == nullptr) continue;
       std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),
                    [&](const std::string& id) { return id != edge->name->text; });

@@ -134,7 +134,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
   }
   HeldVersion& fresh = push_held(newest.slot, value.X_PC);
   fresh.samples = samples;
-  end_revision(fresh, value);
+  end_revision(fresh, value.revision);
   append_to(fresh, value, stamp);
   drop_samples(*samples, stamp);
 }

@@ -17,7 +17,7 @@ struct EdgeCursor {
   std::string id;
   std::string parent;
   std::uint64_t history = 0;  ///< of the values seen; 0: none
-  std::uint64_t commit = 0;   ///< up to which values were seen
+  std::uint64_t commit = 0;   ///< up to which values were seen, also in a reply
   Handle frame{};             ///< found by id if it does not exist any more
 };
 
@@ -70,8 +70,6 @@ struct PushedQuery {
   /// Tell how each sample is correlated that an observation has corrected. Otherwise such a sample
   /// has all of its covariance, as a watcher of single edges needs it.
   bool of_samples = false;
-  /// If nothing was seen yet: besides the newest samples, those of later commits than this.
-  std::optional<std::uint64_t> after{};
 };
 
 }  // namespace tfdude

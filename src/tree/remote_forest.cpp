@@ -188,11 +188,30 @@ bool RemoteForest::is_edge(const Version& version, const Name* called, std::stri
   return top != nullptr && text_of(load(top->name)) == parent;
 }
 
+const Head* RemoteForest::head_of(const Name* called) const {
+  const Name* name = here(called);
+  return name != nullptr ? head_of(load(name->slot)) : nullptr;
+}
+
+template <class Is>
+RemoteForest::Former RemoteForest::last_where(const Head& head, std::uint64_t commit, Is is) const {
+  const Version* version = at(head, commit);
+  // The version was that of the slot up to this commit.
+  std::uint64_t last = commit;
+  for (int newer = 0; version != nullptr && newer < kMostNewer; ++newer) {
+    const std::uint64_t since = load(version->commit);
+    if (since == 0 || since > last) return {};
+    if (is(*version, last)) return {version, last};
+    last = since - 1;
+    version = here(static_cast<const Version*>(load(version->older)));
+  }
+  return {};
+}
+
 std::optional<RemotePlace> RemoteForest::find(std::string_view id, std::string_view parent,
                                               std::uint64_t commit) const {
   const Name* called = name_of(id);
-  const Name* name = here(called);
-  const Head* head = name != nullptr ? head_of(load(name->slot)) : nullptr;
+  const Head* head = head_of(called);
   const Version* version = head != nullptr ? at(*head, commit) : nullptr;
   if (version == nullptr || !is_edge(*version, called, parent, commit)) return std::nullopt;
   const RemotePlace found{head, load(version->attachment)};
@@ -203,36 +222,21 @@ std::optional<RemotePlace> RemoteForest::find(std::string_view id, std::string_v
 std::optional<RemotePlace> RemoteForest::find_former(std::string_view id, std::string_view parent,
                                                      std::uint64_t commit) const {
   const Name* called = name_of(id);
-  const Name* name = here(called);
-  const Head* head = name != nullptr ? head_of(load(name->slot)) : nullptr;
-  const Version* version = head != nullptr ? at(*head, commit) : nullptr;
-  // The version was that of the slot up to this commit.
-  std::uint64_t last = commit;
-  for (int newer = 0; version != nullptr && newer < kMostNewer; ++newer) {
-    const std::uint64_t since = load(version->commit);
-    if (since == 0 || since > last) return std::nullopt;
-    if (is_edge(*version, called, parent, last)) {
-      const RemotePlace found{head, load(version->attachment)};
-      if (!intact(last)) return std::nullopt;
-      return found;
-    }
-    last = since - 1;
-    version = here(static_cast<const Version*>(load(version->older)));
-  }
-  return std::nullopt;
+  const Head* head = head_of(called);
+  if (head == nullptr) return std::nullopt;
+  const Former former = last_where(*head, commit, [&](const Version& version, std::uint64_t last) {
+    return is_edge(version, called, parent, last);
+  });
+  if (former.version == nullptr) return std::nullopt;
+  const RemotePlace found{head, load(former.version->attachment)};
+  if (!intact(former.commit)) return std::nullopt;
+  return found;
 }
 
 std::uint64_t RemoteForest::last_commit_of(const RemotePlace& place, std::uint64_t commit) const {
-  const Version* version = at(*place.head, commit);
-  std::uint64_t last = commit;
-  for (int newer = 0; version != nullptr && newer < kMostNewer; ++newer) {
-    const std::uint64_t since = load(version->commit);
-    if (since == 0 || since > last) return 0;
-    if (is(*version, place)) return last;
-    last = since - 1;
-    version = here(static_cast<const Version*>(load(version->older)));
-  }
-  return 0;
+  return last_where(*place.head, commit,
+                    [&](const Version& version, std::uint64_t) { return is(version, place); })
+      .commit;
 }
 
 bool RemoteEdge::read(const FlatCorrelation* theirs, Correlation& copy) const {

@@ -103,6 +103,16 @@ class RemoteForest {
   // As at(), if the newest version is not the one.
   [[nodiscard]] const HeldVersion* older(const RemotePlace& place, std::uint64_t commit) const;
   [[nodiscard]] const Head* head_of(std::uint32_t slot) const;
+  // Of the frame with this name, which may be null, at the owner's address.
+  [[nodiscard]] const Head* head_of(const Name* called) const;
+  // A version, and the last commit at which it was that of its slot; null: there is none.
+  struct Former {
+    const Version* version = nullptr;
+    std::uint64_t commit = 0;
+  };
+  // The newest version up to a commit of which is(version, its last commit) holds.
+  template <class Is>
+  [[nodiscard]] Former last_where(const Head& head, std::uint64_t commit, Is is) const;
   [[nodiscard]] std::string_view text_of(const Name* theirs) const;
   // The name of a frame, at the owner's address; null: it has none of this id.
   [[nodiscard]] const Name* name_of(std::string_view id) const;

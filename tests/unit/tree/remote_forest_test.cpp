@@ -356,17 +356,27 @@ TEST_CASE("lookups in the memory of others are those of one forest") {
   }
 }
 
-TEST_CASE("an edge that its owner has moved is not read until that is known here") {
+// An owner of base -> side and base -> tip, and a reader that knows its frames.
+struct Branched {
+  Branched() {
+    REQUIRE(arm.forest.add("base", "", along_x(0)));
+    REQUIRE(arm.forest.add("side", "base", along_x(100)));
+    REQUIRE(arm.forest.add("tip", "base", along_x(1)));
+    others.attach(1, arm.seen(), nullptr);
+    REQUIRE(here.put_remote("base", "", 1));
+    REQUIRE(here.put_remote("side", "base", 1));
+    REQUIRE(here.put_remote("tip", "base", 1));
+  }
   SharedForest arm;
-  REQUIRE(arm.forest.add("base", "", along_x(0)));
-  REQUIRE(arm.forest.add("side", "base", along_x(100)));
-  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
   Forest here;
   RemoteEdges others;
-  others.attach(1, arm.seen(), nullptr);
-  REQUIRE(here.put_remote("base", "", 1));
-  REQUIRE(here.put_remote("side", "base", 1));
-  REQUIRE(here.put_remote("tip", "base", 1));
+};
+
+TEST_CASE("an edge that its owner has moved is not read until that is known here") {
+  Branched branched;
+  SharedForest& arm = branched.arm;
+  Forest& here = branched.here;
+  RemoteEdges& others = branched.others;
   const auto look = [&] { return here.lookup("base", "tip", others); };
   CHECK(outcome(look()) == "not_owner");
   REQUIRE(here.bind("base", "tip", others) == 1);
@@ -397,16 +407,10 @@ TEST_CASE("an edge that its owner has moved is not read until that is known here
 }
 
 TEST_CASE("until it is known here what became of an edge, its last value is there") {
-  SharedForest arm;
-  REQUIRE(arm.forest.add("base", "", along_x(0)));
-  REQUIRE(arm.forest.add("side", "base", along_x(100)));
-  REQUIRE(arm.forest.add("tip", "base", along_x(1)));
-  Forest here;
-  RemoteEdges others;
-  others.attach(1, arm.seen(), nullptr);
-  REQUIRE(here.put_remote("base", "", 1));
-  REQUIRE(here.put_remote("side", "base", 1));
-  REQUIRE(here.put_remote("tip", "base", 1));
+  Branched branched;
+  SharedForest& arm = branched.arm;
+  Forest& here = branched.here;
+  RemoteEdges& others = branched.others;
   REQUIRE(here.bind("base", "tip", others) == 1);
   const auto former = [&] { return here.lookup_former("base", "tip", others); };
   CHECK(x_of(former()) == 1);
