@@ -247,6 +247,7 @@ std::set<PendingYield> FrameClaims::pending_yields() const {
   add_removed(all,
               [this](Owner by) { return is_there(by) && succession_.survived(by, kHeldHere); });
   add_orphans(all);
+  add_conceded(all);
   return all;
 }
 
@@ -282,6 +283,19 @@ void FrameClaims::add_orphans(std::set<PendingYield>& all) const {
       all.insert({PendingYield::Kind::kRemove, frame.id, one->owner, frame.lamport_time,
                   one->lamport_time});
     }
+  }
+}
+
+// Removals by this process that end no claim of a partition that is there. They would end it later,
+// if that partition were away for a while, with all that was done to its frame in the meantime.
+void FrameClaims::add_conceded(std::set<PendingYield>& all) const {
+  const auto here = [](const FrameRemoval& one) { return one.owner == kHeldHere; };
+  for (const std::string& id : doubted_) {
+    const auto there = forest_.info(id);
+    if (!there || there->owner == kHeldHere || !is_there(there->owner)) continue;
+    if (succession_.survived(kHeldHere, there->owner)) continue;
+    if (removals_.find(id, there->owner, there->lamport_time, here) == nullptr) continue;
+    all.insert({PendingYield::Kind::kConcede, id, there->owner, there->lamport_time});
   }
 }
 

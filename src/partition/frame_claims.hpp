@@ -33,6 +33,7 @@ struct PendingYield {
     kRelease,  ///< `rival` has the older claim to the id: release the frame
     kUnhang,   ///< the frame closes a cycle with an earlier move by `rival`: make it a root
     kRemove,   ///< `rival` removed the frame or its parent: remove the frame, too
+    kConcede,  ///< `rival` has the frame, and its claim holds: forget that it was removed here
   };
   Kind kind = Kind::kRelease;
   std::string frame;
@@ -127,6 +128,7 @@ class FrameClaims {
   template <class Condition>
   void add_removed(std::set<PendingYield>& all, Condition condition) const;
   void add_orphans(std::set<PendingYield>& all) const;
+  void add_conceded(std::set<PendingYield>& all) const;
   void doubt(const std::string& id);
   void drop(const std::string& id);
   [[nodiscard]] bool is_there(Owner owner) const {

@@ -68,6 +68,7 @@ class Pages {
   /// Sets the tombstone of a frame, instead of an earlier one.
   /// @return the frames whose tombstones were dropped for it
   std::vector<std::string> leave(const Tombstone& tombstone);
+  void forget_tombstone(const std::string& id);
 
   [[nodiscard]] std::optional<Place> place(const std::string& id) const;
   [[nodiscard]] std::optional<Tombstone> tombstone(const std::string& id) const;
@@ -117,7 +118,6 @@ class Pages {
   void changed(std::uint32_t number, const std::string& id);
   void note_epochs();
   void list_others(Page& page) const;
-  void forget_tombstone(const std::string& id);
 
   std::string partition_;
   std::uint64_t incarnation_;

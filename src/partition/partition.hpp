@@ -157,6 +157,7 @@ class Partition {
   void put(const std::string& id, const std::string& parent, std::uint64_t lamport_time);
   void forget(const std::vector<std::string>& removed, LamportTime when);
   void yield_to(const std::string& id, Owner rival, Time now);
+  bool concede(const std::string& id, Owner rival, Time now);
   [[nodiscard]] Result<void> forget_partition(const ForgetRequest& request, Time now);
   void make_root(const std::string& id, Owner rival, Time now);
   void tell_conflict(const Tombstone& tombstone);

@@ -182,7 +182,7 @@ bool Partition::yield(const std::set<PendingYield>& due, Time now) {
   using Kind = PendingYield::Kind;
   bool changed = false;
   // A release or removal may open a cycle, but not vice versa.
-  for (const Kind kind : {Kind::kRelease, Kind::kRemove, Kind::kUnhang}) {
+  for (const Kind kind : {Kind::kRelease, Kind::kRemove, Kind::kConcede, Kind::kUnhang}) {
     for (const PendingYield& one : directory_.pending_yields()) {
       if (one.kind == kind && due.count(one) != 0) changed = yield(one, now) || changed;
     }
@@ -194,7 +194,10 @@ bool Partition::yield(const std::set<PendingYield>& due, Time now) {
 bool Partition::yield(const PendingYield& pending, Time now) {
   // An earlier yield may have resolved this one, too, or be the same.
   const auto frame = forest_.info(pending.frame);
-  if (!frame || frame->owner != kHeldHere) return false;
+  if (!frame) return false;
+  if (pending.kind == PendingYield::Kind::kConcede)
+    return concede(pending.frame, pending.rival, now);
+  if (frame->owner != kHeldHere) return false;
   switch (pending.kind) {
     case PendingYield::Kind::kRelease:
       (void)forest_.release(pending.frame);
@@ -211,8 +214,23 @@ bool Partition::yield(const PendingYield& pending, Time now) {
       // As of the rival's removal: it must not end what others have claimed since.
       if (auto removed = forest_.remove(pending.frame)) forget(*removed, pending.removed_at);
       return true;
+    case PendingYield::Kind::kConcede:
+      break;
   }
   return false;
+}
+
+// What was only released belongs to whoever claims it: no conflict.
+bool Partition::concede(const std::string& id, Owner rival, Time now) {
+  const auto removal = pages_.tombstone(id);
+  if (!removal) return false;
+  if (removal->kind == Tombstone::Kind::kRemoved) {
+    yield_to(id, rival, now);
+  } else {
+    pages_.forget_tombstone(id);
+    directory_.forget_own_tombstone(id);
+  }
+  return true;
 }
 
 void Partition::yield_to(const std::string& id, Owner rival, Time now) {

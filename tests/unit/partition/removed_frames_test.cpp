@@ -22,6 +22,7 @@ using testing::page_with;
 using testing::presence_of;
 using testing::Replica;
 using testing::StoringOwner;
+using testing::unsaved;
 using testing::Witness;
 using Lines = std::vector<std::string>;
 using Kind = Absent::Kind;
@@ -147,6 +148,49 @@ TEST_CASE("a partition that released a frame lets its former owner have it") {
   left_arm.directory.apply(Page{"arm", 0, 2, 3, {{"hand", "", 10}}});
   CHECK(left_arm.structure() == Lines{"hand <  @ arm"});
   CHECK(left_arm.directory.absent().empty());
+}
+
+// Its state still says that it survived arm, but arm returned while it was gone itself.
+TEST_CASE("a removal is over once its partition returns to an owner that has the frame again") {
+  MemoryStore store;
+  const Absent lost{"arm", 0, Kind::kLost, 1};
+  auto left_arm = std::make_unique<StoringOwner>("left_arm", &store);
+  left_arm->directory.restore({lost});
+  left_arm->start({{"hand", "", along_x(1)}});
+  const bool dropped = GENERATE(false, true);
+  if (dropped) {
+    REQUIRE(left_arm->partition.release({"hand"}, kNow));
+    REQUIRE(store.save(unsaved(left_arm->partition)));
+  } else {
+    REQUIRE(left_arm->ask("hand", RemoveRequest{{"hand"}}) == "ok");
+  }
+  const auto meet_arm = [&] {
+    left_arm->directory.apply(said_by("arm", {{"left_arm", 0, Kind::kBack, 1}}), kNow);
+    left_arm->directory.apply(page_with("arm", {{"hand", "", 10}, {"cup", "hand", 4000}}));
+  };
+  left_arm = std::make_unique<StoringOwner>("left_arm", &store);
+  const bool at_start = GENERATE(true, false);
+  if (at_start) meet_arm();
+  left_arm->start();
+  if (!at_start) {
+    // It was alone when it started, and hears later that arm did without it.
+    meet_arm();
+    CHECK(left_arm->yield());
+  }
+  CHECK(left_arm->structure() == Lines{"cup < hand @ arm, attached", "hand <  @ arm"});
+  CHECK_FALSE(left_arm->yield());
+  const auto conflicts = left_arm->conflicts();
+  REQUIRE(conflicts.size() == (dropped ? 0 : 1));
+  if (!dropped) CHECK_THAT(conflicts.front(), Catch::Contains("'arm', which keeps it"));
+  // For all, whatever becomes of arm.
+  for (const Page& page : left_arm->partition.take_pages()) {
+    for (const Tombstone& one : page.tombstones) CHECK(one.kind == Tombstone::Kind::kYielded);
+  }
+  REQUIRE(store.save(unsaved(left_arm->partition)));
+  const StoredState stored = store.load().value();
+  CHECK(std::none_of(stored.tombstones.begin(), stored.tombstones.end(), [](const auto& one) {
+    return one.kind == Tombstone::Kind::kRemoved || one.kind == Tombstone::Kind::kDropped;
+  }));
 }
 
 TEST_CASE("an owner that returns yields the frames that others have removed meanwhile") {
