@@ -108,8 +108,10 @@ Error Discovery::explained(Error error) {
   error.message += about_keys;
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || error.code == Errc::kUnknownPartition) return error;
+  const bool between = error.code == Errc::kNotConnected;
   return {Errc::kUnreachable,
-          error.message + "; it may belong to partition " + quote(missed->name) +
+          error.message + (between ? "; what connects them" : "; it") +
+              " may belong to partition " + quote(missed->name) +
               ", which has not been reachable since " + to_string(missed->since) +
               ", before this process started: it " + why_absent(*missed),
           error.frame, missed->name};

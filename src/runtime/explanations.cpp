@@ -204,7 +204,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
                              const WhyQuery& query) {
   Cause cause;
   cause.error = std::move(error);
-  if (explain_missed(cause)) return cause;
+  if (explain_missed(a, b, cause)) return cause;
   // What is missing at the time limit is no longer an error of its own, but is still missing.
   for (const std::string& id : {a, b}) {
     if (!structure_.forest.exists(id)) {
@@ -258,16 +258,17 @@ void Explanations::explain_unknown(const std::string& id, Cause& cause) {
       "network, keys)";
 }
 
+std::optional<FrameInfo> Explanations::top_of(const std::string& id) const {
+  auto frame = structure_.forest.info(id);
+  while (frame && frame->attached && !frame->parent.empty()) {
+    auto above = structure_.forest.info(frame->parent);
+    if (!above) break;
+    frame = std::move(above);
+  }
+  return frame;
+}
+
 void Explanations::explain_apart(const std::string& a, const std::string& b, Cause& cause) {
-  const auto top_of = [&](const std::string& id) {
-    auto frame = structure_.forest.info(id);
-    while (frame && frame->attached && !frame->parent.empty()) {
-      auto above = structure_.forest.info(frame->parent);
-      if (!above) break;
-      frame = std::move(above);
-    }
-    return frame;
-  };
   const auto top_a = top_of(a);
   const auto top_b = top_of(b);
   for (const auto& top : {top_a, top_b}) {
@@ -298,12 +299,15 @@ void Explanations::explain_absent(const std::vector<FrameInfo>& edges, Cause& ca
   }
 }
 
-bool Explanations::explain_missed(Cause& cause) {
+bool Explanations::explain_missed(const std::string& a, const std::string& b, Cause& cause) {
   if (cause.error.code != Errc::kUnreachable) return false;
   const Lock lock(structure_.mutex);
   const auto missed = structure_.directory.only_heard_of();
   if (!missed || missed->name != cause.error.partition) return false;
   cause.frame = cause.error.frame;
+  for (const auto& top : {top_of(a), top_of(b)}) {
+    if (top && !top->parent.empty()) cause.frame = top->parent;
+  }
   blame(*missed, cause);
   return true;
 }

@@ -53,7 +53,8 @@ class Explanations {
   void explain_unknown(const std::string& id, Cause& cause);
   void explain_apart(const std::string& a, const std::string& b, Cause& cause);
   /// By an owner that others miss, and of which nothing else is known here.
-  [[nodiscard]] bool explain_missed(Cause& cause);
+  [[nodiscard]] bool explain_missed(const std::string& a, const std::string& b, Cause& cause);
+  [[nodiscard]] std::optional<FrameInfo> top_of(const std::string& id) const;
   void explain_absent(const std::vector<FrameInfo>& edges, Cause& cause);
   void explain_time(const Owners& owners, const WhyQuery& query, Cause& cause);
   [[nodiscard]] bool has_other_clock(const Owners& owners, Cause& cause);

@@ -10,6 +10,19 @@
 #include "runtime/wall_clock.hpp"
 
 namespace tfdude {
+namespace {
+
+// Sorted, as the frames are.
+template <class Condition>
+std::vector<std::string> ids_of(const std::vector<Frame>& frames, Condition condition) {
+  std::vector<std::string> ids;
+  for (const Frame& frame : frames) {
+    if (condition(frame)) ids.push_back(frame.id);
+  }
+  return ids;
+}
+
+}  // namespace
 
 Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b) {
   const auto route = [&](const Directory& directory) -> Result<std::vector<PathSegment>> {
@@ -62,12 +75,17 @@ Result<std::vector<Frame>> Queries::followed() {
   return frames;
 }
 
+bool Queries::knows_all() {
+  const Lock lock(structure_.mutex);
+  return !structure_.directory.only_heard_of();
+}
+
 std::vector<KnownFrame> Queries::frames_before() {
+  if (knows_all()) return {};
   const Deadline deadline = discovery_.call_deadline();
   std::vector<Part> owners;
   {
     const Lock lock(structure_.mutex);
-    if (!structure_.directory.only_heard_of()) return {};
     for (const Owner owner : structure_.directory.reachable_owners()) {
       const FramesRequest all{{}, {std::string(1, kAnyName)}};
       const std::string& name = structure_.directory.name(owner);
@@ -117,6 +135,14 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  if (!knows_all()) {
+    auto all = frames();
+    if (!all) return tl::unexpected(std::move(all.error()));
+    const auto is_it = [&](const Frame& frame) { return frame.id == id; };
+    if (std::any_of(all->begin(), all->end(), is_it)) {
+      return ids_of(*all, [&](const Frame& frame) { return frame.attached && frame.parent == id; });
+    }
+  }
   return structure_.forest.children(id);
 }
 
@@ -125,7 +151,10 @@ Result<std::vector<std::string>> Queries::roots() {
     return tl::unexpected(std::move(ok.error()));
   }
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
-  return structure_.forest.roots();
+  if (knows_all()) return structure_.forest.roots();
+  auto all = frames();
+  if (!all) return tl::unexpected(std::move(all.error()));
+  return ids_of(*all, [](const Frame& frame) { return !frame.attached; });
 }
 
 Result<std::vector<PartitionInfo>> Queries::partitions() {

@@ -44,6 +44,8 @@ class Queries {
 
  private:
   [[nodiscard]] Result<std::vector<Frame>> followed();
+  /// Whether no partition was lost before this process started.
+  [[nodiscard]] bool knows_all();
   /// Frames of partitions that were lost before this process started, as an owner knows them.
   [[nodiscard]] std::vector<KnownFrame> frames_before();
   [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }

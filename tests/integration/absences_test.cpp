@@ -133,6 +133,38 @@ TEST_CASE("absences: a daemon keeps the frames that it took over when their firs
   CHECK(owner_of(late, "hand") == "left_arm");
 }
 
+TEST_CASE("absences: a client that starts after a loss knows the frames of the lost owner") {
+  Robot robot;
+  const std::string tool_config = robot.directory.write(
+      "tool.yaml", "partition: tool\nframes:\n  - {id: tool, parent: hand, xyz: [5, 0, 0]}\n");
+  const Process tool = robot.start(tool_config);
+  auto early = Client::open(robot.domain.options()).value();
+  REQUIRE(early.lookup("world", "tool"));
+  robot.arm->kill();
+  REQUIRE(eventually([&] {
+    const auto X = early.lookup("world", "tool");
+    return !X && X.error().code == Errc::kUnreachable;
+  }));
+  auto late = Client::open(robot.domain.options()).value();
+  using Ids = std::vector<std::string>;
+  for (Client* client : {&early, &late}) {
+    CHECK(client->roots().value() == Ids{"world"});
+    CHECK(client->children("world").value() == Ids{"arm"});
+    CHECK(client->children("arm").value() == Ids{"hand"});
+    CHECK(client->children("hand").value() == Ids{"tool"});
+    CHECK(client->children("tool").value().empty());
+    CHECK(client->children("head").error().code == Errc::kUnknownFrame);
+    const auto X = client->lookup("world", "tool");
+    REQUIRE_FALSE(X);
+    CHECK(X.error().partition == "arm");
+    const Explanation why = client->why("world", "tool");
+    REQUIRE(why.cause);
+    CHECK(why.cause->obstacle == Obstacle::kOwnerLost);
+    CHECK(why.cause->partition == "arm");
+    CHECK(why.cause->frame == (client == &early ? "arm" : "hand"));
+  }
+}
+
 TEST_CASE("absences: a daemon that hung yields its frames to the one that took them over") {
   Robot robot;
   auto client = Client::open(robot.domain.options()).value();

@@ -173,7 +173,7 @@ TEST_CASE("a removal is over once its partition returns to an owner that has the
   if (at_start) meet_arm();
   left_arm->start();
   if (!at_start) {
-    // It was alone when it started, and hears later that arm did without it.
+    // Left_arm was alone when it started, and hears later that arm did without it.
     meet_arm();
     CHECK(left_arm->yield());
   }
