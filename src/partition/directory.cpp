@@ -7,6 +7,14 @@
 #include "partition/counters.hpp"
 
 namespace tfdude {
+namespace {
+
+std::size_t items_of(const Page& page) {
+  return 1 + page.entries.size() + page.tombstones.size() + page.joints.size();
+}
+
+}  // namespace
+
 Directory::Directory(Forest& forest, std::string own)
     : forest_(forest), claims_(forest, changes_), partitions_(1) {
   if (!own.empty()) owners_.emplace(own, kHeldHere);
@@ -26,6 +34,42 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
   return partitions_[owner];
 }
 
+bool Directory::has_room_for(const Known& partition, const Page& page) const {
+  std::size_t items = items_of(page);
+  for (const Known& one : partitions_) {
+    items += one.items + (one.successor ? one.successor->items : 0);
+  }
+  if (items <= most_items_) return true;
+  // The page may replace one.
+  std::size_t before = 0;
+  if (partition.successor && partition.successor->incarnation == page.incarnation) {
+    const auto there = partition.successor->pages.find(page.number);
+    if (there != partition.successor->pages.end()) before = items_of(there->second);
+  } else if (partition.incarnation == page.incarnation) {
+    const auto there = partition.pages.find(page.number);
+    if (there != partition.pages.end()) before = there->second.items;
+  }
+  return items - before <= most_items_;
+}
+
+void Directory::refuse(const std::string& partition) {
+  ++refused_;
+  const auto number = number_of(partition);
+  // One that is not known has no place where this could be noted.
+  if (!number) {
+    if (refused_ == 1) cut_.push_back(partition);
+    return;
+  }
+  Known& known = partitions_[*number];
+  if (std::exchange(known.cut, known.live) != known.live) cut_.push_back(partition);
+}
+
+bool Directory::is_cut(std::string_view partition) const {
+  const auto number = number_of(partition);
+  return number && partitions_[*number].cut != 0 &&
+         partitions_[*number].cut == partitions_[*number].live;
+}
+
 // The pages of a new incarnation, collected beside the current ones; null if the current ones need
 // not be kept.
 Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarnation) {
@@ -42,13 +86,14 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
     return nullptr;
   }
   if (!partition.successor || partition.successor->incarnation < incarnation) {
-    partition.successor = Successor{incarnation, {}, {}};
+    partition.successor = Successor{incarnation, {}, {}, 0};
   }
   return &*partition.successor;
 }
 
 void Directory::apply(const Presence& presence, Time now) {
   if (!presence.serving && !presence.stopped) return;
+  if (!has_room_for(presence.partition)) return refuse(presence.partition);
   Owner owner = kHeldHere;
   (void)known(presence.partition, owner);
   if (owner == kHeldHere) return;
@@ -95,6 +140,7 @@ void Directory::apply(const Presence& presence, Time now) {
 }
 
 void Directory::apply(const Page& page) {
+  if (!has_room_for(page.partition)) return refuse(page.partition);
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
   if (owner == kHeldHere) return;
@@ -110,9 +156,15 @@ void Directory::apply(const Page& page) {
     if (!partition.info.reachable) partition.info.since = Time{};
     came_back(partition, owner);
   }
-  if (Successor* successor = succeed(partition, page.incarnation)) {
+  Successor* successor = succeed(partition, page.incarnation);
+  if (!has_room_for(partition, page)) return refuse(page.partition);
+  if (successor != nullptr) {
     if (page.incarnation < successor->incarnation) return;
-    successor->pages.insert_or_assign(page.number, page);
+    Page& kept = successor->pages[page.number];
+    // Of a page that was not there before, nothing is subtracted.
+    if (!kept.partition.empty()) successor->items -= items_of(kept);
+    successor->items += items_of(page);
+    kept = page;
     replace_if_complete(partition, owner);
   } else {
     const std::vector<Tombstone> fresh = new_tombstones(partition, page.tombstones);
@@ -148,6 +200,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
     replace_joints(page, {}, owner);
   }
   const auto before = std::exchange(partition.pages, {});
+  partition.items = 0;
   // The first claim to each frame now replaces that of the previous incarnation, whichever is
   // younger.
   for (const auto& [number, page] : pages) put_page(partition, owner, page, stays);
@@ -170,6 +223,8 @@ void Directory::put_page(Known& partition, Owner owner, const Page& page, Ids& o
   put_removals(page, owner);
   unclaim_all_but(stays, partition, owner, page.number);
   KeptPage& kept = partition.pages[page.number];
+  partition.items -= std::exchange(kept.items, items_of(page));
+  partition.items += kept.items;
   kept.ids.clear();
   for (const PageEntry& entry : page.entries) {
     saw_lamport_time(entry.lamport_time);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -37,6 +38,18 @@ class Directory {
 
   /// From now on no pages come (AskedFrames): what is not here is not missing.
   void do_without_pages() { without_pages_ = true; }
+
+  /// How many names of partitions are kept at most.
+  static constexpr std::size_t kMaxPartitions = 4096;
+  /// How much of the pages of others is kept at most: their entries, tombstones and joints, and one
+  /// more for each page. Pages beyond are dropped, so that their partitions stay incomplete.
+  void limit_others(std::size_t items) { most_items_ = items; }
+  /// Messages of others that were dropped because of these limits.
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+  /// Whether pages of that partition were, since its latest process is known.
+  [[nodiscard]] bool is_cut(std::string_view partition) const;
+  /// Partitions whose messages were dropped for the first time since the last call.
+  [[nodiscard]] std::vector<std::string> take_cut() { return std::exchange(cut_, {}); }
 
   /// A partition is served, or stops. A later incarnation replaces an earlier one.
   void apply(const Presence& presence, Time now);
@@ -212,6 +225,7 @@ class Directory {
     std::string ids;
     std::vector<Tombstone> tombstones;
     std::vector<PageJoint> joints;
+    std::size_t items = 0;
   };
 
   /// A new incarnation of a partition with a known structure, until all its pages have come.
@@ -219,6 +233,7 @@ class Directory {
     std::uint64_t incarnation = 0;
     std::optional<std::uint32_t> page_count;  // from its presence
     PageMap pages;
+    std::size_t items = 0;
   };
   struct Known {
     PartitionInfo info;
@@ -231,7 +246,9 @@ class Directory {
     std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
+    std::size_t items = 0;  // of the pages
     std::optional<Successor> successor;
+    std::uint64_t cut = 0;       // the incarnation of which pages were dropped
     std::uint64_t heard_of = 0;  // the latest incarnation mentioned by others
     bool forgotten = false;      // up to heard_of
     // Up to this incarnation, once the partition is unreachable here, too.
@@ -254,6 +271,12 @@ class Directory {
   };
 
   Known& known(const std::string& partition, Owner& owner);
+  /// Whether that name is known, or can still be.
+  [[nodiscard]] bool has_room_for(const std::string& partition) const {
+    return partitions_.size() < kMaxPartitions || number_of(partition);
+  }
+  [[nodiscard]] bool has_room_for(const Known& partition, const Page& page) const;
+  void refuse(const std::string& partition);
   [[nodiscard]] std::optional<Owner> number_of(std::string_view partition) const;
   void hear_absent(Owner from, const Presence& presence);
   void hear_of(const Absent& one, const std::string& teller);
@@ -311,6 +334,9 @@ class Directory {
   std::uint64_t own_forgotten_ = 0;  // the latest one that others have forgotten
   std::vector<Outdated> outdated_;
   bool without_pages_ = false;
+  std::size_t most_items_ = std::numeric_limits<std::size_t>::max();
+  std::uint64_t refused_ = 0;
+  std::vector<std::string> cut_;
   std::uint64_t version_ = 0;
 };
 

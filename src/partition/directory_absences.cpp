@@ -109,6 +109,10 @@ void Directory::hear_absent(Owner from, const Presence& presence) {
   if (!same_process) absences_.teller_restarted(teller);
   absences_.replace_reports(presence.absent, teller);
   for (const Absent& one : presence.absent) {
+    if (!has_room_for(one.partition)) {
+      refuse(one.partition);
+      continue;
+    }
     Owner number = kHeldHere;
     (void)known(one.partition, number);
     // A sender is reachable.
@@ -219,6 +223,11 @@ Result<void> Directory::check_not_there(const std::string& partition) const {
 
 Result<void> Directory::forget(const std::string& partition, std::uint64_t incarnation, Time now) {
   if (auto ok = check_not_there(partition); !ok) return ok;
+  if (!has_room_for(partition)) {
+    return fail(Errc::kTooMuch, "partition " + quote(partition) +
+                                    " cannot be noted: this process " + "knows the names of " +
+                                    std::to_string(kMaxPartitions) + " partitions, its limit");
+  }
   Owner number = kHeldHere;
   Known& gone = known(partition, number);
   const std::uint64_t sound = incarnation < IncarnationSource::kEnd ? incarnation : 0;
@@ -240,6 +249,7 @@ void Directory::drop_structure(Known& partition, Owner owner) {
     replace_joints(page, {}, owner);
   }
   partition.pages.clear();
+  partition.items = 0;
   partition.successor.reset();
   partition.page_count = 0;
 }

@@ -245,6 +245,7 @@ Outcome Member::take_outcome() {
   if (directory_.resolve_returns() && partition_ != nullptr) outcome_.to_commit = true;
   compare_plans();
   outcome_.outdated = directory_.take_outdated();
+  outcome_.cut = directory_.take_cut();
   outcome_.events = directory_.changes().take();
   return std::exchange(outcome_, {});
 }

@@ -35,6 +35,7 @@ struct Ready {
 struct Outcome {
   std::vector<Change> events{};  ///< in order; without times
   std::vector<Directory::Outdated> outdated{};
+  std::vector<std::string> cut{};           ///< partitions of which not everything is kept
   std::optional<Presence> appeared{};       ///< a partition that is served now
   std::optional<Presence> stopped{};        ///< a partition that announced its stop
   std::optional<std::string> lost{};        ///< a partition that no longer sends

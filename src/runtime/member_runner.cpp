@@ -24,6 +24,12 @@ void log_outcome(const Outcome& outcome, const std::string& own) {
     log().warn("messages of process {} of partition {} are ignored: process {} is newer",
                one.incarnation, quote(one.partition), one.latest);
   }
+  for (const std::string& one : outcome.cut) {
+    log().warn(
+        "partition {} has more than this process keeps of others (--max-others, {} partitions): "
+        "its structure stays incomplete here",
+        quote(one), Directory::kMaxPartitions);
+  }
   if (outcome.appeared) log().info("partition {} is reachable", who(*outcome.appeared));
   if (outcome.stopped) log().info("partition {} was stopped", who(*outcome.stopped));
   if (outcome.lost) log().info("partition {} is lost: it no longer sends", quote(*outcome.lost));

@@ -44,6 +44,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       advances_(context_),
       streams_(context_) {
   const Lock lock(structure_.mutex);
+  structure_.directory.limit_others(options_.limits.others);
   if (!wants_pages()) structure_.directory.do_without_pages();
 }
 
@@ -183,6 +184,7 @@ RefusedCounts Participant::refused() {
   counts.messages = transport_->dropped();
   counts.datagrams = transport_->refused_datagrams();
   const Lock lock(structure_.mutex);
+  counts.structure = structure_.directory.refused();
   if (const Partition* own = member_.partition()) counts.frames = own->refused_frames();
   return counts;
 }

@@ -64,6 +64,24 @@ TEST_CASE("bounds: alone in the domain every call returns a definite answer") {
   CHECK(outcome(client.lookup("world", "tool", {}, 1ms)) == "unknown_start");
 }
 
+TEST_CASE("bounds: a client keeps no more of the structure of others than its limit") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  std::vector<FrameSpec> frames{{"world", "", {}}};
+  for (int i = 0; i < 3000; ++i) frames.push_back({"shelf" + std::to_string(i), "world", {}});
+  const auto store = Node::open(join("store"), "store", frames).value();
+  const auto robot = Node::open(join("robot"), "robot", {{"tool", "", {}}}).value();
+  Options options;
+  options.limits.others = 2000;
+  auto client = Client::open(join(""), options).value();
+  CHECK(client.exists("tool"));
+  const auto X = client.lookup("tool", "absent");
+  REQUIRE_FALSE(X);
+  CHECK(X.error().code == Errc::kTimeout);
+  CHECK_THAT(X.error().message,
+             testing::ContainsSubstring("'store' has more frames than are kept here"));
+  CHECK(Client::open(join("")).value().lookup("world", "shelf2999"));
+}
+
 TEST_CASE("bounds: the first lookup of a client ends at its maximum wait") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const auto node =

@@ -29,8 +29,8 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 /// False if the environment's TFDUDE_SHARED_MEMORY is "off".
 [[nodiscard]] TFDUDE_EXPORT bool shared_memory_of_environment();
 
-/// How much others can make a Node keep. What would exceed it is rejected with kTooMuch, except
-/// samples.
+/// How much others can make a participant keep. What would exceed it is rejected with kTooMuch,
+/// except samples.
 struct PartitionLimits {
   std::size_t frames = 200'000;  ///< that the partition owns
   /// Groups of watchers. Those that watch the same edges of the partition in the same way are one.
@@ -38,6 +38,9 @@ struct PartitionLimits {
   /// Of the samples of all its edges. The oldest ones are dropped for new ones, and counted
   /// (Node::refused()); the two newest of each edge stay.
   std::size_t history_bytes = std::size_t{256} << 20U;
+  /// Of the structure of all other partitions: their frames, joints and latest removals. What is
+  /// beyond is not kept, and its partitions stay incomplete here. Also for a Client.
+  std::size_t others = 2'000'000;
 };
 
 /// How a participant joins a domain. Participants discover each other only in the same domain and
@@ -97,7 +100,7 @@ struct Options {
   /// The robot description (URDF) of a Node's partition, which others can ask for. It is only
   /// passed on: the frames are those given to Node::open().
   std::string description;
-  /// Limits of a Node.
+  /// Limits of a Node, and `others` of a Client.
   PartitionLimits limits{};
   /// Maximum time that the destructor of a client waits until the values it has streamed (publish,
   /// publish_joints) are acknowledged, as flush() does; at most `timeout`.

@@ -12,6 +12,8 @@ struct RefusedCounts {
   std::uint64_t watches = 0;
   /// Samples that were dropped from histories for newer ones, to keep to the limit of memory.
   std::uint64_t dropped_samples = 0;
+  /// Pages and presences of others that were not kept (PartitionLimits::others).
+  std::uint64_t structure = 0;
   std::uint64_t messages = 0;  ///< requests and stream messages, dropped unread
   /// Datagrams that no participant sends, or only one with keys; see docs/security.md.
   std::uint64_t datagrams = 0;

@@ -392,5 +392,86 @@ TEST_CASE("frames of others get their parents when an own frame leaves a cycle")
   }
 }
 
+Page numbered(const std::string& partition, std::uint32_t number, std::size_t frames,
+              std::uint64_t incarnation = 1) {
+  Page page{partition, number, incarnation, incarnation + 1 + number, {}};
+  for (std::size_t i = 0; i < frames; ++i) {
+    page.entries.push_back(
+        {partition + std::to_string(number) + "_" + std::to_string(i), "", 10 + i});
+  }
+  return page;
+}
+
+TEST_CASE("of the structure of others no more is kept than may be") {
+  Replica replica("base");
+  Directory& directory = replica.directory;
+  directory.limit_others(30);
+  const auto frames = [&] { return replica.forest.frames().size(); };
+  directory.apply(presence_of("arm", 1, 2), kNow);
+  directory.apply(numbered("arm", 0, 9));
+  directory.apply(presence_of("evil", 1, 100), kNow);
+  for (std::uint32_t i = 0; i < 100; ++i) directory.apply(numbered("evil", i, 4));
+  // 10 of arm, and 5 for each of four pages of evil.
+  CHECK(frames() == 9 + 4 * 4);
+  CHECK(directory.refused() == 96);
+  CHECK(directory.take_cut() == Lines{"evil"});
+  CHECK(directory.is_cut("evil"));
+  CHECK_FALSE(directory.is_cut("arm"));
+  SECTION("a page that is replaced makes room for its successor") {
+    directory.apply(numbered("arm", 0, 9));
+    directory.apply(numbered("evil", 2, 4));
+    CHECK(directory.refused() == 96);
+    directory.apply(numbered("evil", 2, 0));
+    directory.apply(numbered("arm", 1, 3));
+    CHECK(frames() == 12 + 3 * 4);
+    CHECK(directory.complete() == false);
+    CHECK(*directory.incomplete() == "evil");
+  }
+  SECTION("who is forgotten leaves its room to others") {
+    CHECK(directory.lost("evil", 1, kNow));
+    REQUIRE(directory.forget("evil", 1, kNow));
+    directory.apply(numbered("arm", 1, 19));
+    CHECK(frames() == 28);
+    CHECK(directory.complete());
+    directory.apply(numbered("arm", 1, 20));
+    CHECK(frames() == 28);
+    CHECK(directory.take_cut() == Lines{"arm"});
+  }
+  SECTION("pages that wait until a restarted partition is complete count, too") {
+    directory.apply(presence_of("arm", 2, 1), kNow);
+    directory.apply(numbered("arm", 0, 9, 2));
+    CHECK(directory.is_cut("arm"));
+    CHECK(directory.lost("evil", 1, kNow));
+    REQUIRE(directory.forget("evil", 1, kNow));
+    directory.apply(numbered("arm", 0, 9, 2));
+    CHECK(directory.complete());
+    directory.apply(numbered("arm", 1, 19, 2));
+    CHECK(frames() == 28);
+  }
+}
+
+TEST_CASE("no more partitions are known than may be") {
+  Replica replica("base");
+  Directory& directory = replica.directory;
+  directory.apply(presence_of("arm", 1, 1), kNow);
+  for (std::size_t i = 0; i < Directory::kMaxPartitions + 10; ++i) {
+    const std::string name = "evil" + std::to_string(i);
+    if (i % 3 == 0) directory.apply(presence_of(name, 1, 1), kNow);
+    if (i % 3 == 1) directory.apply(Page{name, 0, 1, 2, {}});
+    if (i % 3 != 2) continue;
+    Presence presence = presence_of("arm", 1, 1);
+    presence.absent = {{name, 0, Absent::Kind::kLost, 1}};
+    directory.apply(presence, kNow);
+  }
+  CHECK(directory.partitions().size() <= Directory::kMaxPartitions);
+  // base and arm are two of them.
+  CHECK(directory.refused() == 12);
+  directory.apply(Page{"arm", 0, 1, 2, {{"hand", "", 10}}});
+  CHECK(replica.forest.exists("hand"));
+  const auto forgotten = directory.forget("unheard", 0, kNow);
+  REQUIRE_FALSE(forgotten);
+  CHECK(forgotten.error().code == Errc::kTooMuch);
+}
+
 }  // namespace
 }  // namespace tfdude
