@@ -5,15 +5,19 @@
 //   faults --seed 7 --seconds 60
 //   faults --rounds 100
 //   faults --endings 30000
+//   faults --attack 10 [--secured]
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "faults/attacker.hpp"
+#include "faults/beside_attack.hpp"
 #include "faults/endings.hpp"
 #include "faults/final_check.hpp"
 #include "faults/nemesis.hpp"
@@ -32,6 +36,11 @@ struct Arguments {
   std::size_t clients = 4;
   std::size_t rounds = 0;
   std::size_t endings = 0;
+  double attack = 0;
+  bool secured = false;
+  std::string attacker;
+  std::uint32_t domain = 0;
+  std::string keys;
 };
 
 // A longer delay [ms] is not caused by a slow machine.
@@ -108,7 +117,22 @@ int main(int argc, char** argv) {
                  "instead: kill and start one daemon this often, and look at what it leaves");
   app.add_option("--endings", arguments.endings,
                  "instead: run this many programs that end at once, and look for crashes");
+  auto* attack = app.add_option(
+      "--attack", arguments.attack,
+      "instead: flood daemons in each way for so many seconds, and look at how long an "
+      "honest client waits");
+  app.add_flag("--secured", arguments.secured, "all have keys")->needs(attack);
+  auto* attacker = app.add_option("--attacker", arguments.attacker, "instead: be one of them")
+                       ->check(CLI::IsMember(tfdude::faults::attacks()));
+  app.add_option("--domain", arguments.domain, "of the attacked")->needs(attacker);
+  app.add_option("--keys", arguments.keys, "of the attacker")->needs(attacker);
   CLI11_PARSE(app, argc, argv);
+  if (!arguments.attacker.empty()) {
+    return tfdude::faults::attack(arguments.attacker, arguments.domain, arguments.keys);
+  }
+  if (arguments.attack > 0) {
+    return tfdude::faults::run_attacks(arguments.attack, arguments.secured);
+  }
   if (arguments.endings > 0) return tfdude::faults::run_endings(arguments.endings);
   if (arguments.rounds > 0) return tfdude::faults::run_rounds(arguments.rounds);
   return tfdude::faults::run(arguments);

@@ -90,8 +90,7 @@ class Filters {
 
   Owner owner_;
   FastDdsCounters counters_;
-  fastdds::FairShare fair_share_;
-  fastdds::OwnedFilters filters_{kPartition, owner_, counters_, fair_share_};
+  fastdds::OwnedFilters filters_{kPartition, owner_, counters_};
   fastdds::edds::IContentFilter* requests_ = nullptr;
   fastdds::edds::IContentFilter* updates_ = nullptr;
   fastdds::edds::IContentFilter* joints_ = nullptr;

@@ -14,7 +14,8 @@ struct RefusedCounts {
   std::uint64_t dropped_samples = 0;
   /// Pages and presences of others that were not kept (PartitionLimits::others).
   std::uint64_t structure = 0;
-  std::uint64_t messages = 0;  ///< requests and stream messages, dropped unread
+  /// Datagrams of senders that took more than their share, dropped unread.
+  std::uint64_t messages = 0;
   /// Datagrams that no participant sends, or only one with keys; see docs/security.md.
   std::uint64_t datagrams = 0;
 };

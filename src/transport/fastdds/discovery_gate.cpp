@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
 
 #include "transport/fastdds/addresses.hpp"
-#include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/outgoing.hpp"
 #include "transport/fastdds/send_throttle.hpp"
 
@@ -38,7 +38,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
                   bool of_client, DataPorts ports_of_data, std::shared_ptr<std::mutex> one_by_one,
                   std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs,
                   std::shared_ptr<Acknowledgements> acks,
-                  std::shared_ptr<DatagramGuard> datagram_guard)
+                  std::shared_ptr<DatagramGuard> datagram_guard,
+                  std::shared_ptr<FairShare> fair_share)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         client(of_client),
@@ -47,7 +48,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
         gate(std::move(inward)),
         life_signs(std::move(signs)),
         acknowledgements(std::move(acks)),
-        guard(std::move(datagram_guard)) {}
+        guard(std::move(datagram_guard)),
+        shares(std::move(fair_share)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
@@ -68,6 +70,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<LifeSigns> life_signs;
   std::shared_ptr<Acknowledgements> acknowledgements;
   std::shared_ptr<DatagramGuard> guard;
+  std::shared_ptr<FairShare> shares;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -79,6 +82,12 @@ std::uint32_t host_of(const ertps::Locator_t& locator) {
   return static_cast<std::uint32_t>(address[0]) << 24U |
          static_cast<std::uint32_t>(address[1]) << 16U |
          static_cast<std::uint32_t>(address[2]) << 8U | address[3];
+}
+
+FairShare::Sender sender_at(const ertps::Locator_t& locator) {
+  std::uint32_t address = 0;
+  std::memcpy(&address, ertps::IPLocator::getIPv4(locator), sizeof address);
+  return static_cast<FairShare::Sender>(address) << 32U | locator.port;
 }
 
 class GatedTransport final : public SendFilter {
@@ -121,11 +130,25 @@ class GatedTransport final : public SendFilter {
     descriptor_.life_signs->heard(bytes, size, now);
     descriptor_.acknowledgements->heard(bytes, size);
     FairShare::begin(now);
-    SendFilter::receive(next, bytes, size, local, remote);
+    handle(next, bytes, size, local, remote, now);
     FairShare::end(FairShare::Clock::now());
   }
 
  private:
+  // Messages of discovery come to a thread of their own.
+  void handle(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
+              std::uint32_t size, const ertps::Locator_t& local, const ertps::Locator_t& remote,
+              FairShare::Clock::time_point now) {
+    if (!descriptor_.data_ports.contain(local.port)) {
+      return SendFilter::receive(next, bytes, size, local, remote);
+    }
+    const FairShare::Sender sender = sender_at(remote);
+    if (!descriptor_.shares->admits(sender, now)) return;
+    SendFilter::receive(next, bytes, size, local, remote);
+    const auto end = FairShare::Clock::now();
+    descriptor_.shares->spent(sender, end - now, end);
+  }
+
   std::uint32_t size_to_send(ertps::SenderResource* through, const ertps::octet* bytes,
                              std::uint32_t size) override {
     announces_through_ = is_announcement(bytes, size) ? through : nullptr;
@@ -240,8 +263,9 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
-                                                  gate_, life_signs_, acknowledgements_, guard_);
+    transport =
+        std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering, gate_,
+                                          life_signs_, acknowledgements_, guard_, shares_);
   }
 }
 

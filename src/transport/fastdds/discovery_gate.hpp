@@ -8,6 +8,7 @@
 #include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/datagram_guard.hpp"
+#include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/life_signs.hpp"
 
@@ -39,14 +40,17 @@ class DiscoveryGate {
   /// @param gate  all datagrams received over UDP pass it
   /// @param life_signs, acknowledgements  are told of each of them
   /// @param guard  decides which of them Fast DDS has
+  /// @param shares  and whether those with data would take too much of its time
   DiscoveryGate(
       std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
       std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>(),
-      std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false))
+      std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false),
+      std::shared_ptr<FairShare> shares = std::make_shared<FairShare>())
       : gate_(std::move(gate)),
         life_signs_(std::move(life_signs)),
         acknowledgements_(std::move(acknowledgements)),
-        guard_(std::move(guard)) {}
+        guard_(std::move(guard)),
+        shares_(std::move(shares)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -68,6 +72,7 @@ class DiscoveryGate {
   const std::shared_ptr<LifeSigns> life_signs_;
   const std::shared_ptr<Acknowledgements> acknowledgements_;
   const std::shared_ptr<DatagramGuard> guard_;
+  const std::shared_ptr<FairShare> shares_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

@@ -2,18 +2,19 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
-#include <map>
+#include <unordered_map>
 
 #include "base/mutex.hpp"
-#include "partition/messages.hpp"
 
 namespace tfdude::fastdds {
 
 /// Keeps one sender from delaying the messages of all others. Fast DDS handles what arrives at a
 /// socket one after the other, on one thread, so a sender that floods it fills the socket's queue.
-/// When that thread has not been idle for a while, messages of senders that took more than their
-/// share of its time are dropped unread, which costs a fraction of answering them.
+/// When that thread has not been idle for a while, datagrams of senders that took more than their
+/// share of its time are dropped before Fast DDS sees them, which takes a fraction of the time.
+/// What was to arrive reliably is repeated, when its sender is within its share again.
 ///
 /// The time that a sender took is forgotten exponentially. Time comes from outside.
 /// @par Thread safety  begin(), end() and admits() are for the thread that handles a datagram; all
@@ -21,6 +22,8 @@ namespace tfdude::fastdds {
 class FairShare {
  public:
   using Clock = std::chrono::steady_clock;
+  /// The address from which a datagram came. What it says of its sender may be forged.
+  using Sender = std::uint64_t;
 
   /// A thread that continues within this time had messages waiting.
   static constexpr std::chrono::microseconds kGap{15};
@@ -28,22 +31,30 @@ class FairShare {
   static constexpr std::chrono::microseconds kOverloadedAfter{500};
   /// Time constant of forgetting.
   static constexpr std::chrono::milliseconds kMemory{50};
-  /// The share of all heavy senders together. The rest of the time is needed to drop messages.
+  /// The share of all heavy senders together. The rest of the time is for the others, and for
+  /// dropping.
   static constexpr double kShare = 0.5;
-  /// A sender is active for this time after a message. A lone sender has no limit.
+  /// A sender is active for this time after a datagram. A lone sender has no limit.
   static constexpr std::chrono::seconds kActive{2};
+  /// Of so many senders the time is known; the one that was silent for longest is dropped.
+  static constexpr std::size_t kMost = 256;
+  /// The allowance of a sender for datagrams without a message, and its growth in a second [s].
+  static constexpr double kAllowance = 1;
+  static constexpr double kAllowanceGrowth = 0.1;
 
   /// The calling thread begins or has ended handling a datagram.
   static void begin(Clock::time_point now);
   static void end(Clock::time_point now);
+  /// The datagram at hand has a request or a streamed value. Other datagrams are what participants
+  /// send by themselves, for example the structure to one that comes late: they count only beyond
+  /// an allowance.
+  static void has_message();
 
-  /// Whether to read a message of this sender; counts it otherwise.
-  [[nodiscard]] bool admits(const PeerId& sender, Clock::time_point now);
+  /// Whether to handle a datagram of this sender; counts it otherwise.
+  [[nodiscard]] bool admits(Sender sender, Clock::time_point now);
 
-  /// Reading and answering a message of this sender took so long.
-  void spent(const PeerId& sender, Clock::duration time, Clock::time_point now);
-
-  void left(const PeerId& sender);
+  /// Handling a datagram of this sender took so long.
+  void spent(Sender sender, Clock::duration time, Clock::time_point now);
 
   [[nodiscard]] std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
 
@@ -51,12 +62,20 @@ class FairShare {
   struct Account {
     double seconds = 0;
     Clock::time_point at;
+    double allowance = kAllowance;
+    Clock::time_point active{};  // when something was charged last
 
     [[nodiscard]] double now(Clock::time_point now) const;
   };
 
+  void count(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+
   Mutex mutex_;
-  std::map<PeerId, Account> accounts_ TFDUDE_GUARDED_BY(mutex_);
+  std::unordered_map<Sender, Account> accounts_ TFDUDE_GUARDED_BY(mutex_);
+  // As of counted_: a datagram that is dropped must not take longer the more senders there are.
+  Clock::time_point counted_ TFDUDE_GUARDED_BY(mutex_);
+  int heavy_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  int active_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::atomic<std::uint64_t> dropped_{0};
 };
 

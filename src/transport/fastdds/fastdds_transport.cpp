@@ -185,9 +185,9 @@ Result<void> FastDdsTransport::read_requests(std::unique_ptr<Reader<wire::Reques
   reader = std::make_unique<Requests>(
       context(), **filtered, partition, "call_reader",
       Requests::Calls{
-          accounted([this, may_change](const wire::Request& sample, const edds::SampleInfo& info) {
+          [this, may_change](const wire::Request& sample, const edds::SampleInfo& info) {
             take_request(sample, writer_of(info).guidPrefix, may_change);
-          }),
+          },
           [this](const ertps::GUID_t& from, int change) {
             if (change <= 0) return;
             worker_->post([this, peer = peer_of(from.guidPrefix)] { open_reply_writer(peer); });
@@ -197,7 +197,7 @@ Result<void> FastDdsTransport::read_requests(std::unique_ptr<Reader<wire::Reques
 
 Result<void> FastDdsTransport::serve(const std::string& partition) {
   using Info = edds::SampleInfo;
-  filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_, fair_share_);
+  filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_);
   const auto filters = created("the filters of partition " + quote(partition), [&] {
     const bool known =
         ok(participant_->register_content_filter_factory(OwnedFilters::kClassName, filters_.get()));
@@ -215,16 +215,14 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
   updates_ = std::make_unique<Reader<wire::Update>>(
       context(), **updates, partition, "update_reader",
       Reader<wire::Update>::Calls{
-          accounted([this](const wire::Update& sample, const Info&) { take_update(sample); }),
-          nullptr});
+          [this](const wire::Update& sample, const Info&) { take_update(sample); }, nullptr});
   if (!updates_->check() || !handler_->owns_joints()) return updates_->check();
   const auto joints = create_filtered(topics_.joint, partition);
   if (!joints) return tl::unexpected(joints.error());
   joints_ = std::make_unique<Reader<wire::Joints>>(
       context(), **joints, partition, "update_reader",
       Reader<wire::Joints>::Calls{
-          accounted([this](const wire::Joints& sample, const Info&) { take_joints(sample); }),
-          nullptr});
+          [this](const wire::Joints& sample, const Info&) { take_joints(sample); }, nullptr});
   return joints_->check();
 }
 
@@ -340,7 +338,6 @@ void FastDdsTransport::admit(const PeerId& peer, const Announcement& said) {
 // it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
   admission_.left(peer_of(prefix));
-  fair_share_.left(peer_of(prefix));
   peers_.left(prefix);
   attention_.raise();
   worker_->post([this, peer = peer_of(prefix)] {

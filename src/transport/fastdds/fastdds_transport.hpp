@@ -82,7 +82,7 @@ class FastDdsTransport final : public Transport {
     return peers_.awaits_presence() || admission_.awaits_authentication();
   }
   std::vector<std::string> excluded() const override { return admission_.excluded(); }
-  std::uint64_t dropped() const override { return fair_share_.dropped(); }
+  std::uint64_t dropped() const override { return fair_share_->dropped(); }
   std::uint64_t refused_datagrams() const override { return guard_->refused(); }
   std::chrono::nanoseconds busy_for() const override { return gate_->busy_for(Gate::Clock::now()); }
   std::vector<IncompatiblePeer> incompatible() const override { return peers_.incompatible(); }
@@ -113,16 +113,6 @@ class FastDdsTransport final : public Transport {
   void open_reply_writer(const PeerId& peer);
   void reply(const PeerId& to, wire::Reply& sample);
 
-  /// A reader's callback that accounts the time it takes to the sender.
-  template <class Take>
-  auto accounted(Take take) {
-    return [this, take](const auto& sample, const edds::SampleInfo& info) {
-      const auto begin = FairShare::Clock::now();
-      take(sample, info);
-      const auto end = FairShare::Clock::now();
-      fair_share_.spent(peer_of(writer_of(info).guidPrefix), end - begin, end);
-    };
-  }
   void admit(const PeerId& peer, const Announcement& said);
   void take_request(const wire::Request& sample, const ertps::GuidPrefix_t& from, bool may_change);
   void take_update(const wire::Update& sample);
@@ -142,7 +132,8 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<LifeSigns> life_signs_ = std::make_shared<LifeSigns>();
   const std::shared_ptr<Acknowledgements> acknowledgements_ = std::make_shared<Acknowledgements>();
   const std::shared_ptr<DatagramGuard> guard_;
-  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_, guard_};
+  const std::shared_ptr<FairShare> fair_share_ = std::make_shared<FairShare>();
+  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_, guard_, fair_share_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);
@@ -157,7 +148,6 @@ class FastDdsTransport final : public Transport {
   Admission admission_{[this](const PeerId& peer, const Announcement& said) { admit(peer, said); }};
   WriterPartitions writer_partitions_;
   ReplyPaths reply_paths_;
-  FairShare fair_share_;
   Attention attention_;
   Announced announced_;
   bool announced_by_dds_ = true;  // participants hear the announcements of DDS; set at the start

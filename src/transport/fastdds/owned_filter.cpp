@@ -3,15 +3,14 @@
 #include <string_view>
 
 #include "transport/fastdds/codec.hpp"
-#include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::fastdds {
 
 OwnedFilters::OwnedFilters(const std::string& partition, const TransportHandler& handler,
-                           FastDdsCounters& counters, FairShare& fair_share)
+                           FastDdsCounters& counters)
     : counters_(counters),
-      fair_share_(fair_share),
       requests_(*this, kRequestTopic, counters.requests_arrived, counters.requests_passed,
                 [&handler, own = addressee_of(partition)](const std::uint8_t* data,
                                                           std::size_t size) -> std::optional<bool> {
@@ -29,10 +28,9 @@ OwnedFilters::OwnedFilters(const std::string& partition, const TransportHandler&
                                  [&](std::string_view name) { return handler.owns_joint(name); });
               }) {}
 
-bool OwnedFilters::Filter::evaluate(const SerializedPayload& payload, const FilterSampleInfo& info,
+bool OwnedFilters::Filter::evaluate(const SerializedPayload& payload, const FilterSampleInfo&,
                                     const GUID_t&) const {
-  const PeerId sender = peer_of(info.sample_identity.writer_guid().guidPrefix);
-  if (!all_.fair_share_.admits(sender, FairShare::Clock::now())) return false;
+  FairShare::has_message();
   arrived_.fetch_add(1, std::memory_order_relaxed);
   const auto concerned = concerns_(payload.data, payload.length);
   if (!concerned) count_malformed(all_.counters_, topic_);

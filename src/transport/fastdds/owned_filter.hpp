@@ -10,7 +10,6 @@
 #include "tfdude/transport/fastdds.hpp"
 
 #include "transport/fastdds/compat.hpp"
-#include "transport/fastdds/fair_share.hpp"
 #include "transport/port.hpp"
 
 // The library's interfaces have no virtual destructor; the classes here are final and never deleted
@@ -21,18 +20,18 @@
 namespace tfdude::fastdds {
 
 /// The filters of a partition's readers. They pass messages about a frame or joint that the
-/// partition owns, and requests addressed to it by name. They drop the messages of senders that
-/// flood it. They are evaluated at the reader, on the bytes, against the current set of owned
-/// frames: the announced expression, the partition's name, never changes. They read no more than
-/// they need: what passes is checked as a whole before it is deserialized (CheckedType).
+/// partition owns, and requests addressed to it by name. They are evaluated at the reader, on the
+/// bytes, against the current set of owned frames: the announced expression, the partition's name,
+/// never changes. They read no more than they need: what passes is checked as a whole before it is
+/// deserialized (CheckedType).
 class OwnedFilters final : public edds::IContentFilterFactory {
  public:
   /// The name under which the class is registered and announced.
   static constexpr const char* kClassName = "tfdude.owned";
 
-  /// The handler, the counters and the shares outlive this.
+  /// The handler and the counters outlive this.
   OwnedFilters(const std::string& partition, const TransportHandler& handler,
-               FastDdsCounters& counters, FairShare& fair_share);
+               FastDdsCounters& counters);
 
   ReturnCode create_content_filter(const char* filter_class_name, const char* type_name,
                                    const edds::TopicDataType* data_type, const char* expression,
@@ -67,7 +66,6 @@ class OwnedFilters final : public edds::IContentFilterFactory {
   };
 
   FastDdsCounters& counters_;
-  FairShare& fair_share_;
   Filter requests_;
   Filter updates_;
   Filter joints_;

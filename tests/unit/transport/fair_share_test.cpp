@@ -7,8 +7,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr PeerId kFlood{1};
-constexpr PeerId kOther{2};
+constexpr FairShare::Sender kFlood = 1;
+constexpr FairShare::Sender kOther = 2;
 
 /// A thread that handles messages one after the other, each of which takes so long.
 struct Thread {
@@ -17,11 +17,13 @@ struct Thread {
   static inline FairShare::Clock::time_point last{};
   FairShare shares;
 
-  bool handle(const PeerId& sender, std::chrono::microseconds time, std::chrono::microseconds gap) {
+  bool handle(FairShare::Sender sender, std::chrono::microseconds time,
+              std::chrono::microseconds gap, bool has_message = true) {
     now += gap;
     FairShare::begin(now);
     const bool admitted = shares.admits(sender, now);
     if (admitted) {
+      if (has_message) FairShare::has_message();
       now += time;
       shares.spent(sender, time, now);
     } else {
@@ -56,6 +58,41 @@ TEST_CASE("fair share: a lone sender may use all of a thread") {
   Thread thread;
   for (int i = 0; i < 20'000; ++i) CHECK(thread.handle(kFlood, 20us, 1us));
   CHECK(thread.shares.dropped() == 0);
+}
+
+TEST_CASE("fair share: what is no message has an allowance") {
+  Thread thread;
+  // Nearly a second.
+  for (int i = 0; i < 49'000; ++i) {
+    CHECK(thread.handle(kFlood, 20us, 1us, false));
+    if (i % 100 == 0) CHECK(thread.handle(kOther, 20us, 1us));
+  }
+  CHECK(thread.shares.dropped() == 0);
+  const auto start = thread.now;
+  auto spent = 0us;
+  for (int i = 0; i < 100'000; ++i) {
+    if (thread.handle(kFlood, 20us, 1us, false)) spent += 20us;
+    if (i % 100 == 0) CHECK(thread.handle(kOther, 20us, 1us));
+  }
+  const double share = std::chrono::duration<double>(spent) / (thread.now - start);
+  CHECK(share > 0.3);
+  CHECK(share < 0.75);
+  // The allowance has grown again.
+  thread.now += 10s;
+  for (int i = 0; i < 40'000; ++i) {
+    CHECK(thread.handle(kFlood, 20us, 1us, false));
+    if (i % 100 == 0) CHECK(thread.handle(kOther, 20us, 1us));
+  }
+}
+
+TEST_CASE("fair share: a flood of ever new senders takes no memory, and forgets no flood") {
+  Thread thread;
+  for (FairShare::Sender i = 0; i < 100'000; ++i) {
+    (void)thread.handle(kFlood, 20us, 1us);
+    (void)thread.handle(kOther + i, 1us, 1us);
+  }
+  // The other senders need little, so that it is the only heavy one.
+  CHECK(thread.shares.dropped() > 10'000);
 }
 
 TEST_CASE("fair share: a flood that ends is forgotten") {
