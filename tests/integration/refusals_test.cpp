@@ -180,6 +180,7 @@ TEST_CASE("cli: wrong usage exits with 2") {
           {{"tree", "--timeout", "soon"}, "", {"--timeout", "soon"}},
           {{"tree", "--profile", "/nowhere/profile.xml"}, "", {"/nowhere/profile.xml"}},
           {{"tree", "--profile", directory.write("broken.xml", "<profiles><")}, "", {"broken.xml"}},
+          {{"tree", "--profile", directory.path()}, "", {directory.path()}},
           {{"tree", "--domain", "233"}, "", {"233", "232"}},
           {{"tree", "--domain", "-1"}, "", {"--domain", "-1"}},
           {{"joint", "elbow", " 1"}, "", {"'elbow' is not NAME=POSITION"}},
