@@ -32,8 +32,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       writes_(context_),
       joints_(context_),
       observations_(context_),
-      // Watched paths do not read memory: while one is rerouted, its reads could go back.
-      watches_(context_, nullptr),
+      watches_(context_, &memory_),
       watch_server_(context_, watches_),
       lookups_(context_, watches_, &memory_),
       velocities_(context_, lookups_),

@@ -68,7 +68,12 @@ Result<StampedTransform> WatchedPath::lookup(const Query& query) const {
       if (const auto* held = held_.load(std::memory_order_seq_cst)) return *held;
     }
   }
-  const Lock lock(mutex_);
+  Lock lock(mutex_);
+  if (followed_ == nullptr && in_memory()) {
+    // Since a moment.
+    lock.unlock();
+    return lookup(query);
+  }
   if (followed_ == nullptr) return tl::unexpected(why_not_);
   // Without the lock, values may just have been arriving.
   auto found = followed_->lookup(query);
@@ -184,11 +189,16 @@ void WatchedPath::remember(Result<StampedTransform> newest) {
     hold(nullptr);
   } else if (newest.error().code == Errc::kNotYet) {
     // A history was cleared: what was before does not hold any more.
-    newest_.reset();
-    hold(nullptr);
+    forget_newest();
   } else if ((lacks_common(newest) || in_memory()) && newest_ && holder_ == nullptr) {
     hold(std::make_unique<const StampedTransform>(*newest_));
   }
+}
+
+void WatchedPath::forget_newest() {
+  newest_.reset();
+  hold(nullptr);
+  latest_read_ = std::numeric_limits<std::int64_t>::min();
 }
 
 void WatchedPath::hold(std::unique_ptr<const StampedTransform> X) {
@@ -236,8 +246,7 @@ void WatchedPath::interrupt(Error why) {
     memory_.store(nullptr, std::memory_order_seq_cst);
     route_in_memory_.reset();
     show(nullptr);
-    newest_.reset();
-    hold(nullptr);
+    forget_newest();
   }
   tell();
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <list>
 #include <memory>
 #include <optional>
@@ -127,6 +128,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   }
   /// What is found in the memory of the owners, or was there last.
   [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;
+  /// The last transform, if nobody has read a later one.
+  [[nodiscard]] std::optional<StampedTransform> shown_before() const;
+  void explain(const MemoryReads& memory, const Query& query, Error& why) const;
   /// From now on the planned route is read in memory. @return whether another one was shown before
   bool read_memory(Clock::time_point now);
   /// Whether the path uses this route, or is about to.
@@ -165,6 +169,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   /// Call after any change of the shown values.
   void remember_newest() TFDUDE_REQUIRES(mutex_);
   void remember(Result<StampedTransform> newest) TFDUDE_REQUIRES(mutex_);
+  void forget_newest() TFDUDE_REQUIRES(mutex_);
   void hold(std::unique_ptr<const StampedTransform> X) TFDUDE_REQUIRES(mutex_);
 
   const std::string a_;
@@ -175,6 +180,8 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
+  // The latest instant [ns] that was read in memory: what is shown instead is not older.
+  mutable std::atomic<std::int64_t> latest_read_{std::numeric_limits<std::int64_t>::min()};
   const std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
   MemoryReads* const others_;                    // null: all push
   std::atomic<MemoryReads*> memory_{nullptr};    // instead of a mirror

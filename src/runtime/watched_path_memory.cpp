@@ -1,3 +1,4 @@
+#include <thread>
 #include <utility>
 
 #include "runtime/memory_reads.hpp"
@@ -6,6 +7,17 @@
 
 // Watched paths that are read in the memory of their owners.
 namespace tfdude {
+namespace {
+
+// How often memory is read while the path changes its route: some milliseconds.
+constexpr int kMostReads = 1000;
+
+// Whether the structure here and that in memory differ, or the memory is being written.
+bool is_rerouting(const Error& why) {
+  return why.code != Errc::kNotYet && why.code != Errc::kTooOld;
+}
+
+}  // namespace
 
 bool WatchedPath::read_memory(Clock::time_point now) {
   bool rerouted = false;
@@ -32,19 +44,50 @@ bool WatchedPath::read_memory(Clock::time_point now) {
 
 Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query& query) const {
   auto found = memory.lookup_kept(a_, b_, query);
-  if (found) return found;
-  Error& why = found.error();
-  const bool newest = !query.at && !query.age_noise_until && query.order == Order::kSecond;
-  // While the path changes its route, or its edges have no instant in common.
-  if (newest && why.code != Errc::kNotYet) {
-    if (auto former = memory.lookup_former(a_, b_)) return former;
-    if (const auto* held = held_.load(std::memory_order_seq_cst)) return *held;
-    const Lock lock(mutex_);
-    if (newest_) return *newest_;
+  if (query.at || query.age_noise_until || query.order != Order::kSecond) {
+    if (!found) explain(memory, query, found.error());
+    return found;
   }
+  for (int i = 0; !found && i < kMostReads; ++i) {
+    if (i > 0) {
+      std::this_thread::yield();
+      found = memory.lookup_kept(a_, b_, query);
+    }
+    // The structure here may be behind that in memory: then what was there before counts, which is
+    // not older than what others have read.
+    if (!found && is_rerouting(found.error())) found = memory.lookup_former(a_, b_);
+    if (found || is_rerouting(found.error())) continue;
+    if (found.error().code == Errc::kNotYet) break;
+    // Its edges have no instant in common, perhaps because they are others now. If others have read
+    // a later one since, they have.
+    if (auto shown = shown_before()) return *std::move(shown);
+  }
+  if (!found) {
+    explain(memory, query, found.error());
+    return found;
+  }
+  if (!found->stamp) return found;
+  std::int64_t latest = latest_read_.load(std::memory_order_relaxed);
+  const std::int64_t stamp = nanoseconds(*found->stamp);
+  while (stamp > latest && !latest_read_.compare_exchange_weak(latest, stamp)) {
+  }
+  return found;
+}
+
+std::optional<StampedTransform> WatchedPath::shown_before() const {
+  const auto goes_on = [this](const StampedTransform& X) {
+    return !X.stamp || nanoseconds(*X.stamp) >= latest_read_.load(std::memory_order_relaxed);
+  };
+  const auto* held = held_.load(std::memory_order_seq_cst);
+  if (held != nullptr && goes_on(*held)) return *held;
+  const Lock lock(mutex_);
+  if (newest_ && goes_on(*newest_)) return *newest_;
+  return std::nullopt;
+}
+
+void WatchedPath::explain(const MemoryReads& memory, const Query& query, Error& why) const {
   why = memory.explained(std::move(why), a_, b_, query);
   if (why.message.empty()) why = {Errc::kNotYet, "the " + described() + " changes its route"};
-  return found;
 }
 
 Watched::Looked WatchedPath::look(Clock::time_point now) {

@@ -83,6 +83,12 @@ bool RemoteEdges::bind(const Version& edge, std::string_view id, std::string_vie
   if (!read || !place) return false;
   Cell& cell = make_cell(edge.slot);
   const Binding* before = cell.load(std::memory_order_relaxed);
+  // The structure here may be far behind: it has the parent of now, of long ago. What was read of
+  // that is later than what comes next here.
+  const bool goes_back =
+      before != nullptr && before->forest == &forest && before->place.head == place->head &&
+      static_cast<std::int32_t>(place->attachment - before->place.attachment) < 0;
+  if (goes_back) return false;
   cell.store(new Binding{edge.owner, edge.attachment, &forest, owner->second.index, *place},
              std::memory_order_seq_cst);
   std::vector<Retired> unlinked;

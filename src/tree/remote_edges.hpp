@@ -62,7 +62,7 @@ class RemoteEdges {
   /// From now on, its edges are not bound.
   void detach(Owner owner);
 
-  /// Binds an edge, whatever it was bound to before.
+  /// Binds an edge, to the one of now or a later one than before.
   /// @param former  also if its owner has made it another one since; see RemoteReading::go_back()
   /// @return whether it could be found
   bool bind(const Version& edge, std::string_view id, std::string_view parent, bool former = false);

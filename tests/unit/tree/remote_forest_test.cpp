@@ -443,6 +443,27 @@ TEST_CASE("until it is known here what became of an edge, its last value is ther
   CHECK(x_of(former()) == 7);
 }
 
+TEST_CASE("what comes next here is not what was before that which was read") {
+  Branched branched;
+  SharedForest& arm = branched.arm;
+  Forest& here = branched.here;
+  RemoteEdges& others = branched.others;
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  REQUIRE(arm.forest.move("tip", "side"));
+  REQUIRE(arm.forest.update("tip", along_x(2)));
+  // Twice, of which nothing is known here: that it has the same parent is by chance.
+  REQUIRE(arm.forest.move("tip", "base"));
+  REQUIRE(arm.forest.update("tip", along_x(3)));
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  CHECK(x_of(here.lookup("base", "tip", Query{}, others)) == 3);
+  REQUIRE(here.put_remote("tip", "side", 1));
+  CHECK(here.bind("base", "tip", others, true) == 0);
+  CHECK(outcome(here.lookup_former("base", "tip", others)) == "not_owner");
+  REQUIRE(here.put_remote("tip", "base", 1));
+  REQUIRE(here.bind("base", "tip", others) == 1);
+  CHECK(x_of(here.lookup("base", "tip", Query{}, others)) == 3);
+}
+
 TEST_CASE("what is detached is not read, and its memory is kept while somebody reads it") {
   SharedForest arm;
   REQUIRE(arm.forest.add("base", "", along_x(0)));
