@@ -6,10 +6,10 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/observation.hpp"
+#include "tfdude/math/ros_variances.hpp"
 #include "tfdude/types/query.hpp"
 
 #include "../messages.hpp"
-#include "variances.hpp"
 
 // Poses with covariance. ROS's covariance is about axes parallel to those of the header's frame,
 // ours is that of the right perturbation, in the child frame (docs/uncertainty.md).

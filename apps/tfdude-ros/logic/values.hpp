@@ -4,10 +4,10 @@
 #include <string>
 
 #include "tfdude/base/result.hpp"
+#include "tfdude/math/ros_variances.hpp"
 
 #include "../messages.hpp"
 #include "poses.hpp"
-#include "variances.hpp"
 
 // Poses of ROS as values of edges: a filter's estimate replaces the one before. No DDS, no threads
 // and no clock.
