@@ -1,21 +1,29 @@
 #pragma once
 
-#include <cctype>
+#include <charconv>
 #include <cstdlib>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 namespace tfdude::cli {
 
-/// Whether a text is exactly one number.
-[[nodiscard]] inline bool is_number(const std::string& text) {
-  if (text.empty() || std::isspace(static_cast<unsigned char>(text[0])) != 0) return false;
-  char* end = nullptr;
-  (void)std::strtod(text.c_str(), &end);
-  return end == text.c_str() + text.size();
+/// The decimal number that a text is as a whole, also "inf" and "nan". One that no double can hold
+/// is infinite, or zero.
+[[nodiscard]] inline std::optional<double> to_number(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  const char* begin = text.data();
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') ++begin;
+  double number = 0;
+  const auto [stop, code] = std::from_chars(begin, end, number);
+  if (stop != end || code == std::errc::invalid_argument) return std::nullopt;
+  return code == std::errc() ? number : std::strtod(text.c_str(), nullptr);
 }
+
+[[nodiscard]] inline bool is_number(const std::string& text) { return to_number(text).has_value(); }
 
 /// Makes all options that take numbers, of all commands, reject other text: CLI11 reads an empty
 /// text as 0. Call it after all options are added.

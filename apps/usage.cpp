@@ -8,6 +8,7 @@
 #include "tfdude/base/similar.hpp"
 
 #include "numbers.hpp"
+#include "standard_output.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -197,7 +198,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
 int end_parsing(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) {
     (void)app.exit(error);
-    return kDone;
+    return status_with_output(program_name(app), kDone);
   }
   std::fprintf(stderr, "%s: %s\n%s shows what is possible\n", program_name(app).c_str(),
                usage_error(app, error).c_str(), help_of(chosen(app)).c_str());

@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <vector>
 
+#include "../standard_output.hpp"
 #include "format.hpp"
 #include "table.hpp"
 #include "terminal.hpp"
@@ -51,7 +52,7 @@ void Screen::redraw(const std::string& page) {
     std::fputs(text.c_str(), stdout);
     drawn_ = std::count(text.begin(), text.end(), '\n');
   }
-  std::fflush(stdout);
+  flush_or_end();
 }
 
 }  // namespace tfdude::cli

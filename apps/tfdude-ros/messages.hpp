@@ -62,6 +62,18 @@ struct Odometry {
   std::array<double, 36> twist_covariance{};
 };
 
+/// sensor_msgs/NavSatFix, or geographic_msgs/GeoPoseStamped: a place on the Earth.
+struct GeoPose {
+  Time stamp{};
+  std::string frame;              ///< of a receiver, its antenna
+  std::array<double, 3> place{};  ///< latitude, longitude [deg], altitude [m]
+  /// x, y, z, w, in the axes east, north and up; absent: it is a position only.
+  std::optional<std::array<double, 4>> quat{};
+  /// Of the position, 3x3, row by row, along east, north and up [m²]; absent: it is not known.
+  std::optional<std::array<double, 9>> covariance{};
+  bool fixed = true;  ///< false: the receiver had no fix
+};
+
 /// An object that a camera has seen.
 struct Detection {
   std::string id;
@@ -82,7 +94,7 @@ struct ClockTime {
   Time now{};
 };
 
-using Message =
-    std::variant<TfMessage, JointState, Text, PoseWithCovariance, Odometry, Detections, ClockTime>;
+using Message = std::variant<TfMessage, JointState, Text, PoseWithCovariance, Odometry, GeoPose,
+                             Detections, ClockTime>;
 
 }  // namespace tfdude::ros

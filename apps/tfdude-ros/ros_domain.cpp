@@ -24,6 +24,10 @@ Topic odometry_topic(const std::string& name) {
   return {name, MessageType::kOdometry, false, false, 10, 10};
 }
 
+Topic geodetic_topic(const std::string& name, MessageType type) {
+  return {name, type, false, false, 10, 10};
+}
+
 Topic detections_topic(const std::string& name, MessageType type) {
   return {name, type, false, false, 10, 10};
 }

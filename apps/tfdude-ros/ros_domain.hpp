@@ -48,6 +48,8 @@ enum class MessageType : std::uint8_t {
   kAprilTagDetectionArray,
   kArucoMarkers,
   kClock,
+  kNavSatFix,
+  kGeoPoseStamped,
 };
 
 /// A topic, with the quality of service that ROS 2 gives it.
@@ -67,6 +69,8 @@ struct Topic {
 [[nodiscard]] Topic clock_topic();
 [[nodiscard]] Topic pose_topic(const std::string& name);
 [[nodiscard]] Topic odometry_topic(const std::string& name);
+/// @param type  kNavSatFix or kGeoPoseStamped
+[[nodiscard]] Topic geodetic_topic(const std::string& name, MessageType type);
 /// @param type  one of those of detections
 [[nodiscard]] Topic detections_topic(const std::string& name, MessageType type);
 
@@ -101,7 +105,7 @@ class RosDomain {
 
   /// Own messages and malformed ones are left out. @return kTransport.
   [[nodiscard]] virtual Result<void> subscribe(const Topic& topic, Take take) = 0;
-  /// Not of detections. @return kTransport.
+  /// Not of detections and places on the Earth. @return kTransport.
   [[nodiscard]] virtual Result<std::unique_ptr<Publisher>> advertise(const Topic& topic) = 0;
 
   /// The other bridges in this ROS domain.

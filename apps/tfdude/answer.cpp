@@ -14,6 +14,7 @@
 #include "../rendering/json.hpp"
 #include "../rendering/terminal.hpp"
 #include "../rendering/text.hpp"
+#include "../standard_output.hpp"
 #include "../stop_signals.hpp"
 
 namespace tfdude::cli {
@@ -21,7 +22,7 @@ namespace {
 
 void print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
-  std::fflush(stdout);
+  flush_or_end();
 }
 
 nlohmann::json error_json(const Error& error) {
@@ -53,7 +54,7 @@ bool asks_for_zero(const Common& common) {
     const char* value = !same                          ? nullptr
                         : word.size() > kOption.size() ? *typed + kOption.size() + 1
                                                        : typed[1];
-    if (value != nullptr && is_number(value) && std::strtod(value, nullptr) == 0) return true;
+    if (value != nullptr && to_number(value) == 0) return true;
   }
   return false;
 }

@@ -13,6 +13,7 @@
 #include "../exit_status.hpp"
 #include "../network_options.hpp"
 #include "../numbers.hpp"
+#include "../standard_output.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -250,8 +251,7 @@ void complete(CLI::App& app, const std::vector<std::string>& words) {
     completion.words = names_of(completion.kind, options_among(before));
   }
   print(completion.words, begun);
-  (void)std::fflush(stdout);
-  _exit(kDone);
+  _exit(status_with_output("tfdude", kDone));
 }
 
 }  // namespace tfdude::cli

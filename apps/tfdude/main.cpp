@@ -15,6 +15,7 @@
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "../rendering/terminal.hpp"
+#include "../standard_output.hpp"
 #include "../stop_signals.hpp"
 #include "../usage.hpp"
 #include "answer.hpp"
@@ -65,7 +66,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     // Looks for --json itself: CLI11 does not fill `common` from a wrong command line.
     const bool json = std::find(argv, argv + argc, std::string_view("--json")) != argv + argc;
-    if (json && error.get_exit_code() != 0) return cli::report_usage(cli::usage_error(app, error));
+    if (json && error.get_exit_code() != 0) {
+      return cli::status_with_output("tfdude", cli::report_usage(cli::usage_error(app, error)));
+    }
     return cli::end_parsing(app, error);
   }
   // Discovery by a server takes most of the default timeout of a second.
@@ -76,9 +79,7 @@ int main(int argc, char** argv) {
   if (commands.chosen().until_interrupted) cli::block_stop_signals();
   log_fastdds_to_standard_error();
   cli::terminal() = cli::terminal_of(STDOUT_FILENO);
-  const int status = commands.chosen().run(common);
-  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
-  if (!written) std::perror("tfdude: standard output");
+  const int status = cli::status_with_output("tfdude", commands.chosen().run(common));
   // Fast DDS's static destructors would sleep 100 ms.
-  _exit(status == cli::kDone && !written ? cli::kRejected : status);
+  _exit(status);
 }

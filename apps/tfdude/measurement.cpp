@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "../numbers.hpp"
 #include "../rendering/format.hpp"
 #include "../rendering/json.hpp"
 #include "../rendering/text.hpp"
@@ -45,8 +46,8 @@ void Measurement::add_options(CLI::App& app) {
                  "when it was measured: seconds since the epoch or, negative, before now");
   app.add_option("--gate", how.gate, "chi-squared gate probability; 1: accept all")
       ->check([](const std::string& text) {
-        const double gate = std::strtod(text.c_str(), nullptr);
-        return gate > 0 && gate <= 1 ? "" : text + " is not above 0 and at most 1";
+        const auto gate = to_number(text);
+        return gate && *gate > 0 && *gate <= 1 ? "" : text + " is not above 0 and at most 1";
       });
   app.add_flag_callback(
       "--correlated", [this] { how.independent = false; },

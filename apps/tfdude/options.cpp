@@ -6,6 +6,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "../numbers.hpp"
 #include "../rendering/text.hpp"
 #include "stamps.hpp"
 
@@ -47,8 +48,8 @@ CLI::Option* add_watch(CLI::App& app, Command& command, bool& watch) {
 std::function<std::string(const std::string&)> within(double least, double most,
                                                       const char* range) {
   return [=](const std::string& text) {
-    const double value = std::strtod(text.c_str(), nullptr);
-    return value >= least && value <= most ? "" : text + " is not within " + range;
+    const auto value = to_number(text);
+    return value && *value >= least && *value <= most ? "" : text + " is not within " + range;
   };
 }
 

@@ -226,8 +226,9 @@ Result<void> SampleReader::read_row(const std::string& line, Json& object) const
       object["edge"] = text;
       continue;
     }
-    if (!is_number(text)) return wrong(column + ": " + quote(text) + " is not a number");
-    const double number = std::strtod(text.c_str(), nullptr);
+    const auto read = to_number(text);
+    if (!read) return wrong(column + ": " + quote(text) + " is not a number");
+    const double number = *read;
     const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
     if (column == "stamp_ns" && digits) {
       object[column] = std::strtoull(text.c_str(), nullptr, 10);

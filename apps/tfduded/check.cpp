@@ -12,6 +12,7 @@
 #include "tfdude/keys/key_files.hpp"
 
 #include "../process.hpp"
+#include "../standard_output.hpp"
 
 namespace tfdude::daemon {
 namespace {
@@ -153,7 +154,7 @@ int check(const Arguments& arguments, const Config& config) {
     spdlog::error("{}", ok.error().message);
     return cli::kWrongUsage;
   }
-  return std::fflush(stdout) == 0 ? 0 : cli::kRejected;
+  return cli::status_with_output("tfduded", cli::kDone);
 }
 
 }  // namespace tfdude::daemon

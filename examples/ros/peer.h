@@ -10,6 +10,8 @@
 //   objects    STAMP FRAME (ID x y z qx qy qz qw VARIANCE)...    Detection3DArray
 //   tags       as objects                                       AprilTagDetectionArray of Isaac ROS
 //   markers    as objects, whose variances are not sent         ArucoMarkers
+//   navsat     STAMP FRAME STATUS LAT LON ALT TYPE VARIANCE (of east, north and up)    NavSatFix
+//   geopose    STAMP FRAME LAT LON ALT qx qy qz qw                                 GeoPoseStamped
 //   clock      STAMP
 
 #include <dds/dds.h>

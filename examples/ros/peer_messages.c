@@ -238,6 +238,29 @@ static void* parse_markers(char* text) {
   return message;
 }
 
+static void* parse_navsat(char* text) {
+  sensor_msgs_msg_dds__NavSatFix_* message = zeros(1, sizeof *message);
+  message->header_.stamp_ = read_time(&text);
+  message->header_.frame_id_ = next(&text);
+  message->status_.status_ = (uint8_t)atoi(next(&text));
+  message->latitude_ = number(&text);
+  message->longitude_ = number(&text);
+  message->altitude_ = number(&text);
+  message->position_covariance_type_ = (uint8_t)atoi(next(&text));
+  const double variance = number(&text);
+  for (int i = 0; i < 3; ++i) message->position_covariance_[4 * i] = variance;
+  return message;
+}
+
+static void* parse_geopose(char* text) {
+  geographic_msgs_msg_dds__GeoPoseStamped_* message = zeros(1, sizeof *message);
+  message->header_.stamp_ = read_time(&text);
+  message->header_.frame_id_ = next(&text);
+  double* numbers = &message->pose_.position_.latitude_;
+  for (int i = 0; i < 7; ++i) numbers[i] = number(&text);
+  return message;
+}
+
 // Nobody sends these to the peer.
 static void print_nothing(const char* topic, const void* sample) {
   (void)topic;
@@ -266,6 +289,8 @@ const Kind* find_kind(const char* name) {
       {"tags", &isaac_ros_apriltag_interfaces_msg_dds__AprilTagDetectionArray__desc, parse_tags,
        print_nothing},
       {"markers", &ros2_aruco_interfaces_msg_dds__ArucoMarkers__desc, parse_markers, print_nothing},
+      {"navsat", &sensor_msgs_msg_dds__NavSatFix__desc, parse_navsat, print_nothing},
+      {"geopose", &geographic_msgs_msg_dds__GeoPoseStamped__desc, parse_geopose, print_nothing},
       {"clock", &rosgraph_msgs_msg_dds__Clock__desc, parse_clock, print_clock},
   };
   for (size_t i = 0; i < sizeof kKinds / sizeof kKinds[0]; ++i) {

@@ -20,6 +20,8 @@ void bind_frames(py::module_& module);
 void bind_client(py::module_& module);
 void bind_node(py::module_& module);
 void bind_recording(py::module_& module);
+/// Call it last: values of the other classes can then be pickled and copied.
+void bind_pickling(py::module_& module);
 
 /// Six standard deviations: three [m], three [rad].
 [[nodiscard]] StatedCovariance from_stddev(py::handle stddev);

@@ -260,16 +260,23 @@ std::optional<std::vector<Time>> of_array(py::handle at) {
   auto array = py::reinterpret_borrow<py::array>(at);
   if (array.ndim() != 1) return std::nullopt;
   char kind = array.dtype().kind();
+  bool dated = false;
   if (kind == 'M') {
     array = array.attr("astype")("datetime64[ns]").attr("view")("int64");
     kind = 'i';
+    dated = true;
   }
   const auto count = static_cast<std::size_t>(array.shape(0));
   std::vector<Time> instants(count);
   if (kind == 'i' || kind == 'u') {
     const auto ns = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(array);
-    std::transform(ns.data(), ns.data() + count, instants.begin(),
-                   [](std::int64_t t) { return time_of(t); });
+    for (std::size_t i = 0; i < count; ++i) {
+      // How numpy has NaT.
+      if (dated && ns.data()[i] == std::numeric_limits<std::int64_t>::min()) {
+        throw py::value_error("instant " + std::to_string(i) + " is NaT: not a time");
+      }
+      instants[i] = time_of(ns.data()[i]);
+    }
     return instants;
   }
   if (kind != 'f') return std::nullopt;

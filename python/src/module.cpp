@@ -17,5 +17,6 @@ PYBIND11_MODULE(_core, module) {
   bind_client(module);
   bind_node(module);
   bind_recording(module);
+  bind_pickling(module);
   py::module_::import("atexit").attr("register")(py::cpp_function(&finish));
 }

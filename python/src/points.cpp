@@ -121,7 +121,10 @@ void bind_points(py::module_& module) {
       .def_property_readonly(
           "transform", [](const TransformedArray& a) { return a.transform; },
           "The Transform by which they came here.")
-      .def("__len__", [](const TransformedArray& a) { return a.points.size(); });
+      .def("__len__", [](const TransformedArray& a) { return a.points.size(); })
+      .def("__repr__", [](const TransformedArray& a) {
+        return "Points(" + std::to_string(a.points.size()) + ")";
+      });
 }
 
 }  // namespace tfdude::python

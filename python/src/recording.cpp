@@ -170,7 +170,21 @@ void bind_recording(py::module_& module) {
       .def_readonly("messages", &RecordingSummary::messages, "None: not known without reading.")
       .def_readonly("problems", &RecordingSummary::problems, "What is wrong with the file.")
       .def_readonly("left_out", &RecordingSummary::left_out,
-                    "Invalid transforms of ROS; None: call read_all() to know.");
+                    "Transforms of ROS that were left out; None: call read_all() to know.")
+      .def_property_readonly(
+          "transforms",
+          [](const RecordingSummary& summary) -> std::optional<std::map<std::string, std::size_t>> {
+            const auto& counts = summary.transforms;
+            if (!counts) return std::nullopt;
+            return std::map<std::string, std::size_t>{
+                {"messages", counts->messages},   {"names", counts->names},
+                {"values", counts->values},       {"cycles", counts->cycles},
+                {"repeated", counts->repeated},   {"old", counts->old},
+                {"early", counts->early},         {"same", counts->same},
+                {"unstamped", counts->unstamped}, {"jumps", counts->jumps}};
+          },
+          "How many transforms of ROS were left out, or taken otherwise, by kind; None: as\n"
+          "`left_out`. docs/recording.md has the kinds.");
   RecordingClass cls(
       module, "Recording",
       "A file of `tfdude record`, or an MCAP file with transforms of ROS, which is asked as a\n"

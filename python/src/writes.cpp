@@ -1,4 +1,4 @@
-#include <cmath>
+#include <optional>
 
 #include <pybind11/stl.h>
 
@@ -29,16 +29,40 @@ std::vector<double> numbers(py::handle values, std::size_t count, const char* wh
   return {array.data(), array.data() + count};
 }
 
-/// NaN as a variance stands for an unspecified one.
+/// One for each of `count`, or None for it: unspecified.
+std::vector<std::optional<double>> variances_of(py::handle values, std::size_t count) {
+  std::vector<std::optional<double>> variances;
+  const bool named = py::isinstance<py::sequence>(values) && !py::isinstance<py::str>(values);
+  bool lacks = false;
+  if (named && !py::isinstance<py::array>(values)) {
+    for (const py::handle one : py::reinterpret_borrow<py::sequence>(values)) {
+      lacks = lacks || one.is_none();
+    }
+  }
+  if (!lacks) {
+    for (const double one : numbers(values, count, "variances")) variances.emplace_back(one);
+    return variances;
+  }
+  for (const py::handle one : py::reinterpret_borrow<py::sequence>(values)) {
+    variances.push_back(one.is_none() ? std::nullopt
+                                      : std::optional(*doubles(one, {}, "variances").data()));
+  }
+  if (variances.size() != count) {
+    throw py::value_error("variances must have the shape (" + std::to_string(count) + ",), not (" +
+                          std::to_string(variances.size()) + ",)");
+  }
+  return variances;
+}
+
 std::vector<JointValue> joints_of(const Names& names, py::handle positions, py::handle variances) {
   const std::vector<double> position = numbers(positions, names.size(), "positions");
-  const std::vector<double> variance = numbers(variances, names.size(), "variances");
+  const auto variance = variances_of(variances, names.size());
   if (position.empty() && !names.empty()) throw py::type_error("positions must be numbers");
   std::vector<JointValue> joints;
   joints.reserve(names.size());
   for (std::size_t i = 0; i < names.size(); ++i) {
     joints.push_back({names[i], position[i]});
-    if (!variance.empty() && !std::isnan(variance[i])) joints.back().variance = variance[i];
+    if (!variance.empty()) joints.back().variance = variance[i];
   }
   return joints;
 }
@@ -145,8 +169,8 @@ void bind_joints(ClientClass& cls) {
       py::arg("names"), py::arg("positions"), py::arg("variances") = py::none(),
       py::arg("stamp") = py::none(),
       "Streams joint positions (N,) [rad or m] to their owners, without acknowledgement.\n\n"
-      "variances: (N,) [rad² or m²]; None, or NaN for one: unspecified. Repeated calls for the\n"
-      "same joints are cheaper by stream_joints().");
+      "variances: (N,) [rad² or m²]; None for all, or for one in a list: unspecified. Repeated\n"
+      "calls for the same joints are cheaper by stream_joints().");
   cls.def(
       "update_joints",
       [](const Session& session, const Names& names, py::handle positions, py::handle variances,

@@ -62,6 +62,10 @@ def test_trajectory(network, car):
                 trajectory[0]
         dates = (stamps[20:25]).astype("datetime64[ns]")
         assert np.allclose(car.trajectory("odom", "base", dates).poses[:, 0], np.arange(5) / 10)
+        dates[3] = np.datetime64("NaT")
+        for unit in ("ns", "us", "s"):
+            with pytest.raises(ValueError, match="instant 3 is NaT"):
+                car.trajectory("odom", "base", dates.astype(f"datetime64[{unit}]"))
         seconds = car.trajectory("odom", "base", stamps[20:25] / 1e9)
         assert np.allclose(seconds.poses[:, 0], np.arange(5) / 10, atol=1e-4)
         assert len(car.trajectory("odom", "base", [])) == 0

@@ -102,6 +102,44 @@ def generate_launch_description():
         Node(package='rviz2', executable='rviz2', arguments=['-d', config]),
     ])
 """
+ROS_2_YAML = """%YAML 1.2
+---
+launch:
+- arg: {name: sim, default: "false"}
+- node:
+    pkg: tf2_ros
+    args: "--x 0.1 --y -0.2 --yaw 1.5 --roll -0.3 --frame-id /base --child-frame-id lidar"
+    exec: static_transform_publisher
+    name: one
+- node: {pkg: tf2_ros, exec: static_transform_publisher, args: "--z 0.5 --qy 0.6 --qw 0.8
+    --frame-id base --child-frame-id mast"}
+- group:
+  - push_ros_namespace: {namespace: robot}
+  - node:
+      pkg: tf2_ros
+      exec: static_transform_publisher
+      args: >-
+        1 2 3
+        0.3 0.2 0.1
+        mast gps
+- node: {pkg: gazebo_ros, exec: gzserver, if: $(var sim)}
+- group:
+    if: true
+    children:
+    - node:
+        pkg: tf2_ros
+        exec: static_transform_publisher
+        unless: false
+        args: 0 1 0 0 0 0 base imu
+    - node:
+        pkg: tf2_ros
+        exec: static_transform_publisher
+        if: "0"
+        args: 7 0 0 0 0 0 base off
+- group:
+    unless: "true"
+    children: [{node: {pkg: tf2_ros, exec: static_transform_publisher, args: 7 0 0 0 0 0 base never}}]
+"""
 SHELL = """#!/bin/sh
 # rosrun tf static_transform_publisher 9 9 9 0 0 0 a b 10
 rosrun tf static_transform_publisher 1 0 0 0.1 0 0 "map" odom 100 &
@@ -193,6 +231,21 @@ def test_kalibr_places_cameras_in_the_imu_or_in_the_camera_before(tmp_path):
     check(read(tmp_path, both)["cam1"], "imu0", np.linalg.inv(T_CAM_IMU) @ np.linalg.inv(T_1_0), 1e-7)
     assert message(tmp_path, KALIBR + "  T_cam_imu:\n" + rows(T_CAM_IMU)) == (
         "file:14: cam1: T_cn_cnm1 contradicts T_cam_imu of cam0 and of cam1")
+    # Over cameras that only T_cn_cnm1 places, before and after those with T_cam_imu.
+    three = KALIBR + "cam2:\n  T_cn_cnm1:\n" + rows(T_1_0) + "  T_cam_imu:\n"
+    X_2I = np.array(T_1_0) @ np.array(T_1_0) @ np.array(T_CAM_IMU)
+    frames = read(tmp_path, three + rows(X_2I.tolist()))
+    check(frames["cam2"], "imu0", np.linalg.inv(X_2I), 1e-6)
+    X_2I[0, 3] += 0.01
+    assert message(tmp_path, three + rows(X_2I.tolist())) == (
+        "file:21: cam2: T_cn_cnm1 contradicts T_cam_imu of cam0 and of cam2")
+    X_1I = np.array(T_1_0) @ np.array(T_CAM_IMU)
+    late = f"cam0: {{}}\ncam1:\n  T_cn_cnm1:\n{rows(T_1_0)}  T_cam_imu:\n{rows(X_1I.tolist())}"
+    frames = read(tmp_path, late)
+    check(frames["cam0"], "imu0", np.linalg.inv(T_CAM_IMU), 1e-6)
+    check(frames["cam1"], "imu0", np.linalg.inv(X_1I), 1e-6)
+    assert message(tmp_path, late.replace("cam1", "cam2")) == (
+        "file:4: cam2: T_cn_cnm1: there is no camera before")
     flat = f"cam0: {{}}\ncam1:\n  T_cn_cnm1: {np.array(T_1_0).ravel().tolist()}\n"
     check(read(tmp_path, flat)["cam1"], "cam0", np.linalg.inv(T_1_0), 1e-7)
 
@@ -286,7 +339,70 @@ def test_a_launch_file_in_python_decides_nothing(tmp_path):
 
     assert launched("condition=IfCondition('false'), arguments=['1', '2', '3', '0', '0', '0', 'map', 'a']") == (
         "file:1: static_transform_publisher is started under a condition: write what happens")
+    why = "static_transform_publisher is started under a condition: write what happens"
+    call = ("Node(package='tf2_ros', executable='static_transform_publisher', "
+            "arguments=['1', '2', '3', '0', '0', '0', 'map', 'a'])")
+    for line, text in [
+            (2, f"def generate_launch_description():\n    if False:\n        ld.add_action({call})\n"),
+            (1, f"if use: ld.add_action({call})\n"),
+            (3, f"if use:\n    pass\nelse:\n    ld.add_action(\n{call})\n"),
+            (1, f"for i in range(0):\n    if i:\n        pass\n    ld.add_action({call})\n"),
+            (1, f"while False:\n  with x:\n    ld.add_action({call})\n"),
+            (3, f"try:\n    import x\nexcept ImportError:\n    ld.add_action({call})\n"),
+            (2, f"match x:\n  case 1:\n    ld.add_action({call})\n"),
+            (1, f"nodes = [{call} for _ in range(0)]\n"),
+            (1, f"nodes = [{call} if use else None]\n"),
+            (1, f"x = use and {call}\n"),
+            (1, f"x = lambda: {call}\n"),
+            (2, f"GroupAction(actions=[{call}],\n  condition=IfCondition('false'))\n"),
+            (2, f"one = {call}\nif use:\n    ld.add_action(one)\n"),
+            (3, f"def f():\n    if not use:\n        return []\n    return [{call}]\n"),
+            (1, call.replace("publisher'", "publisher' if use else 'rviz2'") + "\n")]:
+        assert message(tmp_path, f"{text}# LaunchDescription\n") == f"file:{line}: {why}", text
+    for more in (" if use else []", " + more"):
+        assert message(tmp_path, call.replace("'a']", "'a']" + more) + "  # LaunchDescription\n").startswith(
+            "file:1: an argument is computed by"), more
+    # What decides about something else does not matter.
+    read(tmp_path, f"""from launch import LaunchDescription
+def other():
+    if use:
+        return 1
+def generate_launch_description():
+    if use:
+        name = 'if'
+    elif \\
+  x == 2:
+        y = 3
+    one = {call}
+    return LaunchDescription([
+        Node(executable='rviz2' if use else 'rqt', condition=IfCondition(use)),
+        one, {call.replace("'a'", "'b'")}])
+""")
     assert launched("**common") == "file:1: static_transform_publisher has no arguments here: write them there"
+
+
+def test_static_transform_publisher_in_yaml(tmp_path):
+    frames = read(tmp_path, ROS_2_YAML)
+    assert list(frames) == ["lidar", "mast", "gps", "imu"]
+    check(frames["lidar"], "base", pose([0.1, -0.2, 0], fixed_axes(-0.3, 0, 1.5)))
+    check(frames["mast"], "base", pose([0, 0, 0.5], rotation([0, 0.6, 0, 0.8])))
+    check(frames["gps"], "mast", pose([1, 2, 3], fixed_axes(0.1, 0.2, 0.3)))
+    check(frames["imu"], "base", pose([0, 1, 0], np.eye(3)))
+    assert message(tmp_path, ROS_2_YAML.replace("--x 0.1", "--x $(var x)")) == (
+        "file:7: static_transform_publisher: '$(var' is a substitution: put its value there")
+    assert message(tmp_path, ROS_2_YAML.replace("--x 0.1", "--ex 0.1")) == (
+        "file:7: static_transform_publisher: unknown argument '--ex'")
+    for given, line in (("if: true", 23), ("unless: false", 28)):
+        decided = given.split(": ")[0] + ": $(var sim)"
+        assert message(tmp_path, ROS_2_YAML.replace(given, decided)).startswith(f"file:{line}: "), given
+        assert message(tmp_path, ROS_2_YAML.replace(given, decided)).endswith(
+            "depends on '$(var sim)': put true or false there")
+    assert message(tmp_path, "launch:\n  static_transform_publisher\n") == (
+        "file:2: launch is not a list of actions")
+    assert message(tmp_path, "launch:\n- node: {exec: static_transform_publisher, args: [1, 2]}\n") == (
+        "file:2: node: args is not text")
+    assert message(tmp_path, "launch:\n- node: {exec: static_transform_publisher}\n").startswith(
+        "file:2: static_transform_publisher: has 0 arguments, but 8 are needed")
 
 
 def test_every_start_of_a_shell_script_is_read(tmp_path):

@@ -127,8 +127,8 @@ def test_joints(network, robot):
         client.flush()
         assert np.allclose(client.lookup("link7", "link8", START + 1000).rpy, [0, 0, positions[7] * 0.5])
         assert not client.lookup("link7", "link8", START + 1000).complete
-        variances = np.full(30, 1e-4)
-        variances[3] = np.nan  # unspecified
+        variances = [1e-4] * 30
+        variances[3] = None  # unspecified
         client.update_joints(names, positions, variances, START + 2000)
         assert client.lookup("link2", "link3").complete and not client.lookup("link3", "link4").complete
         for wrong in (positions[:3], positions.reshape(5, 6), np.full(30, 1j)):
@@ -136,6 +136,15 @@ def test_joints(network, robot):
                 client.publish_joints(names, wrong)
         with pytest.raises(tfdude.InvalidArgumentException, match="joint0"):
             client.publish_joints(names, np.full(30, np.nan))
+        for nan in (np.nan, -1e-9):
+            variances[5] = nan
+            for wrong in (variances, np.array([0 if one is None else one for one in variances])):
+                for call in (client.update_joints, client.publish_joints):
+                    with pytest.raises(tfdude.InvalidArgumentException, match="joint5.*variance"):
+                        call(names, positions, wrong, START + 3000)
+        for wrong in (variances[:3], ["a"] * 30, [None, *["a"] * 29]):
+            with pytest.raises((ValueError, TypeError), match="variances"):
+                client.update_joints(names, positions, wrong)
         with pytest.raises(tfdude.LookupException) as raised:
             client.publish_joints(["no_joint"], [0.0])
         assert raised.value.code == "unknown_joint"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import subprocess
 
 import numpy as np
@@ -93,3 +94,52 @@ def test_what_is_no_recording_is_refused(tmp_path):
     wrong.write_bytes(b"no MCAP at all")
     with pytest.raises(TransformException):
         Recording(str(wrong))
+
+
+def ros_file(messages: list[tuple[str, float, float, str, str, float]]) -> bytes:
+    """A minimal MCAP file of rosbag2: topic, times of logging and stamp [s], parent, child, x."""
+
+    def text(value: str) -> bytes:
+        return struct.pack("<I", len(value)) + value.encode()
+
+    def record(kind: int, content: bytes) -> bytes:
+        return struct.pack("<BQ", kind, len(content)) + content
+
+    def transform(stamp: float, parent: str, child: str, x: float) -> bytes:
+        cdr = bytearray(struct.pack("<III", 1, int(stamp), round(stamp % 1 * 1e9)))
+        for name in (parent, child):
+            cdr += bytes(-len(cdr) % 4) + struct.pack("<I", len(name) + 1) + name.encode() + b"\0"
+        cdr += bytes(-len(cdr) % 8) + struct.pack("<7d", x, 0, 0, 0, 0, 0, 1)
+        return b"\0\1\0\0" + bytes(cdr)
+
+    topics = ["/tf", "/tf_static"]
+    out = b"\x89MCAP0\r\n" + record(1, text("ros2") + text("test"))
+    out += record(3, struct.pack("<H", 1) + text("tf2_msgs/msg/TFMessage") + text("ros2msg") + text("..."))
+    for i, topic in enumerate(topics):
+        out += record(4, struct.pack("<HH", i, 1) + text(topic) + text("cdr") + struct.pack("<I", 0))
+    for i, (topic, log, stamp, parent, child, x) in enumerate(messages):
+        ns = round(log * 1e9)
+        out += record(5, struct.pack("<HIQQ", topics.index(topic), i, ns, ns) + transform(stamp, parent, child, x))
+    return out + record(15, bytes(4)) + record(2, bytes(20)) + b"\x89MCAP0\r\n"
+
+
+def test_what_is_left_out_of_a_recording_of_ros_is_counted(tmp_path):
+    file = tmp_path / "ros.mcap"
+    W = 1_700_000_000
+    file.write_bytes(ros_file(
+        [("/tf_static", W, 0, "base", " lidar", 1), ("/tf_static", W, 0, "base", "lidar", 1),
+         ("/tf_static", W, 0, "lidar", "base", 1)] +
+        [("/tf", W + i, i, "odom", "base", i) for i in range(4)] +
+        [("/tf", W + 3.1, 3, "odom", "base", 9), ("/tf", W + 3.2, 3, "odom", "base", 3)]))
+    recording = Recording(str(file))
+    assert recording.summary.transforms is None and recording.summary.left_out is None
+    recording.read_all()
+    summary = recording.summary
+    assert {kind: count for kind, count in summary.transforms.items() if count} == {
+        "names": 1, "cycles": 1, "repeated": 1, "same": 1, "unstamped": 1}
+    assert summary.left_out == 3
+    for at in (0, 1.5, 3):
+        assert recording.lookup("odom", "lidar", float(at)).translation[0] == at + 1
+    info = subprocess.run([os.environ["TFDUDE_CLI"], "info", file], capture_output=True, text=True, check=True).stdout
+    assert "left out     1 names: " in info and "left out     1 repeated: " in info
+    assert "found        1 unstamped: " in info and "early" not in info

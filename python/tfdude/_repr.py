@@ -12,6 +12,8 @@ _SHOWN: dict[type[Any], tuple[str, ...]] = {
     _core.EdgeConsistency: ("id", "observations", "refused", "squares", "expected"),
     _core.Frame: ("id", "parent", "partition", "attached"),
     _core.FrameSpec: ("id", "parent", "X_PC", "joint"),
+    _core.Geodetic: ("latitude", "longitude", "altitude"),
+    _core.GeodeticPose: ("place", "utm", "X_NB"),
     _core.HistoryInfo: ("id", "samples", "oldest", "newest", "mean_gap", "max_gap"),
     _core.Joint: ("name", "type", "position", "variance"),
     _core.JointInfo: ("name", "frame", "position", "variance", "measured"),
@@ -19,6 +21,7 @@ _SHOWN: dict[type[Any], tuple[str, ...]] = {
     _core.PartitionInfo: ("name", "host", "pid", "frames", "reachable"),
     _core.PathSegment: ("partition", "start", "end"),
     _core.RecordingSummary: ("start", "end", "bytes", "finished", "problems"),
+    _core.Utm: ("zone", "north", "easting", "northing", "altitude"),
     _core.Velocity: ("linear", "angular", "complete", "begin", "end"),
 }
 

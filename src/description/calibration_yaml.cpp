@@ -77,12 +77,78 @@ std::map<std::size_t, std::string> cameras_of(const YAML::Node& root) {
 }
 
 // T_cam_imu is the pose of the IMU in the camera, T_cn_cnm1 that of the camera before.
+class KalibrChain {
+ public:
+  struct Camera {
+    std::size_t number = 0;
+    std::string name;
+    std::optional<Pose> X_CI{};
+    std::optional<Pose> X_CB{};
+    int line = 0;
+  };
+
+  // @return kInvalidInput: it does not fit to the cameras before
+  [[nodiscard]] Result<void> add(const Camera& camera) {
+    if (camera.X_CB && (!before_ || before_->number + 1 != camera.number)) {
+      return fail(Errc::kInvalidInput, "T_cn_cnm1: there is no camera before");
+    }
+    if (!camera.X_CB) begin(camera);
+    if (!camera.X_CI && !camera.X_CB && before_) {
+      return fail(Errc::kInvalidInput, "has neither T_cam_imu nor T_cn_cnm1");
+    }
+    if (camera.X_CB) {
+      X_first_ = *camera.X_CB * X_first_;
+      if (X_I_) *X_I_ = *camera.X_CB * *X_I_;
+    }
+    if (camera.X_CI && X_I_ && !is_near(camera.X_CI->inverse() * *X_I_)) {
+      return fail(Errc::kInvalidInput,
+                  "T_cn_cnm1 contradicts T_cam_imu of " + stated_by_ + " and of " + camera.name);
+    }
+    place(camera);
+    before_ = camera;
+    return {};
+  }
+
+  [[nodiscard]] std::vector<FileEdge> edges() && { return std::move(edges_); }
+
+ private:
+  static bool is_near(const Pose& X) {
+    constexpr double kSame = 1e-3;  // [m] and [rad]: more than the digits that files are given
+    return log(X).cwiseAbs().maxCoeff() <= kSame;
+  }
+
+  void begin(const Camera& camera) {
+    first_ = camera;
+    X_first_ = Pose();
+    X_I_.reset();
+  }
+
+  void place(const Camera& camera) {
+    if (camera.X_CI) {
+      // The first of the chain has no pose of its own, but this one tells it.
+      if (camera.X_CB && !X_I_) {
+        edges_.push_back(edge(first_.name, "imu0", camera.X_CI->inverse() * X_first_, first_.line));
+      }
+      edges_.push_back(edge(camera.name, "imu0", camera.X_CI->inverse(), camera.line));
+      X_I_ = camera.X_CI;
+      stated_by_ = camera.name;
+    } else if (camera.X_CB) {
+      edges_.push_back(edge(camera.name, before_->name, camera.X_CB->inverse(), camera.line));
+    }
+  }
+
+  std::optional<Camera> before_;
+  Camera first_;             // of the cameras that T_cn_cnm1 connects
+  Pose X_first_;             // in the newest camera
+  std::optional<Pose> X_I_;  // the IMU in the newest camera, if a camera of these states it
+  std::string stated_by_;    // the last one that does
+  std::vector<FileEdge> edges_;
+};
+
 FileEdges Reader::kalibr(const YAML::Node& root) const {
   const auto entries = fields(root, "the file");
   if (!entries) return tl::unexpected(entries.error());
-  std::vector<FileEdge> edges;
-  std::optional<Pose> X_before_I;  // the IMU in the camera before
-  std::string before;
+  KalibrChain chain;
   for (const auto& [number, camera] : cameras_of(root)) {
     const Field& field = entries->find(camera)->second;
     const auto keys = fields(field.value, camera);
@@ -98,32 +164,13 @@ FileEdges Reader::kalibr(const YAML::Node& root) const {
     if (!X_CI) return tl::unexpected(X_CI.error());
     const auto X_CB = pose_at("T_cn_cnm1");
     if (!X_CB) return tl::unexpected(X_CB.error());
-    if (*X_CB && before.empty()) {
-      return error(Errc::kInvalidInput, keys->find("T_cn_cnm1")->second.mark,
-                   camera + ": T_cn_cnm1: there is no camera before");
+    if (auto ok = chain.add({number, camera, *X_CI, *X_CB, field.mark.line + 1}); !ok) {
+      const YAML::Mark& mark = *X_CB ? keys->find("T_cn_cnm1")->second.mark : field.mark;
+      const std::string& why = ok.error().message;
+      return error(ok.error().code, mark, camera + (*X_CB ? ": " : " ") + why);
     }
-    if (*X_CB && *X_CI && X_before_I) {
-      constexpr double kSame = 1e-3;  // [m] and [rad]: more than the digits that files are given
-      const Twist off = log((**X_CI).inverse() * **X_CB * *X_before_I);
-      if (off.cwiseAbs().maxCoeff() > kSame) {
-        return error(
-            Errc::kInvalidInput, keys->find("T_cn_cnm1")->second.mark,
-            camera + ": T_cn_cnm1 contradicts T_cam_imu of " + before + " and of " + camera);
-      }
-    }
-    const int line = field.mark.line + 1;
-    if (*X_CI) {
-      edges.push_back(edge(camera, "imu0", (**X_CI).inverse(), line));
-    } else if (*X_CB) {
-      edges.push_back(edge(camera, before, (**X_CB).inverse(), line));
-    } else if (!before.empty()) {
-      return error(Errc::kInvalidInput, field.mark,
-                   camera + " has neither T_cam_imu nor T_cn_cnm1");
-    }
-    X_before_I = *X_CI;
-    before = camera;
   }
-  return edges;
+  return std::move(chain).edges();
 }
 
 Result<std::string> Reader::frame(const Fields& entries, const char* key) const {

@@ -1,5 +1,5 @@
-// Lines that start static_transform_publisher: launch files of ROS 1 and ROS 2, in XML and Python,
-// and shell scripts.
+// Lines that start static_transform_publisher: launch files of ROS 1 and ROS 2, in XML, Python and
+// YAML, and shell scripts.
 
 #include <algorithm>
 #include <initializer_list>
@@ -11,6 +11,7 @@
 
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
+#include "description/launch_starts.hpp"
 #include "description/python_tokens.hpp"
 #include "description/xml_text.hpp"
 #include "types/ros_rules.hpp"
@@ -21,22 +22,8 @@ namespace {
 using tinyxml2::XMLElement;
 using Words = std::vector<std::string>;
 
-constexpr const char* kProgram = "static_transform_publisher";
-
-// One start of the program.
-struct Start {
-  Words words;         // its arguments
-  bool of_tf = false;  // of the package tf, whose last argument is a period
-  int line = 0;
-};
-
-Words split(std::string_view text) {
-  Words words;
-  std::string line(text);
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  for (const std::string_view word : words_of(line)) words.emplace_back(word);
-  return words;
-}
+constexpr const char* kProgram = kStaticPublisher;
+using Start = LaunchStart;
 
 class Arguments {
  public:
@@ -149,14 +136,10 @@ Result<bool> holds(const XMLElement& element, const std::string& name) {
   for (const bool wanted : {true, false}) {
     const char* said = element.Attribute(wanted ? "if" : "unless");
     if (said == nullptr) continue;
-    const std::string_view word = said;
-    const bool yes = word == "true" || word == "1" || word == "True";
-    if (!yes && word != "false" && word != "0" && word != "False") {
-      return file_error(Errc::kInvalidInput, name, element.GetLineNum(),
-                        std::string("<") + element.Name() + "> depends on " + quote(said) +
-                            ": put true or false there");
-    }
-    if (yes != wanted) return false;
+    const auto yes =
+        launch_condition(said, std::string("<") + element.Name() + ">", name, element.GetLineNum());
+    if (!yes) return yes;
+    if (*yes != wanted) return false;
   }
   return true;
 }
@@ -198,7 +181,7 @@ Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::str
     if (!happens) return tl::unexpected(std::move(happens.error()));
     if (!*happens) continue;
     const char* arguments = node->Attribute("args");
-    starts.push_back({split(arguments == nullptr ? "" : arguments),
+    starts.push_back({launch_words(arguments == nullptr ? "" : arguments),
                       is_value(node->Attribute("pkg"), "tf"), node->GetLineNum()});
   }
   return starts;
@@ -258,7 +241,7 @@ Result<std::vector<Start>> starts_in_shell(const std::string& text, const std::s
       line += lines.line();
     }
     for (const std::string& command : shell_commands(" " + line)) {
-      Words words = split(without_redirections(command));
+      Words words = launch_words(without_redirections(command));
       blocks += opened_by(words);
       const auto program = std::find(words.begin(), words.end(), kProgram);
       if (program == words.end()) continue;
@@ -288,14 +271,40 @@ Result<std::vector<Start>> starts_in_python(const std::string& text, const std::
   return starts;
 }
 
+// Its top-level key; no other kind of file has such a line.
+bool is_yaml(const std::string& text) {
+  TextLines lines(text);
+  while (lines.next()) {
+    if (lines.line().rfind("launch:", 0) == 0) return true;
+  }
+  return false;
+}
+
 Result<std::vector<Start>> starts_of(const std::string& text, const std::string& name) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string::npos && text[first] == '<') return starts_in_xml(text, name);
   if (text.find("LaunchDescription") != std::string::npos) return starts_in_python(text, name);
+  if (is_yaml(text)) return starts_in_yaml(text, name);
   return starts_in_shell(text, name);
 }
 
 }  // namespace
+
+std::vector<std::string> launch_words(std::string_view text) {
+  Words words;
+  std::string line(text);
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  for (const std::string_view word : words_of(line)) words.emplace_back(word);
+  return words;
+}
+
+Result<bool> launch_condition(std::string_view said, const std::string& what,
+                              const std::string& file, int line) {
+  const bool yes = said == "true" || said == "1" || said == "True";
+  if (yes || said == "false" || said == "0" || said == "False") return yes;
+  return file_error(Errc::kInvalidInput, file, line,
+                    what + " depends on " + quote(said) + ": put true or false there");
+}
 
 FileEdges read_launch(const std::string& text, const std::string& name) {
   auto starts = starts_of(text, name);

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
+#include "description/python_conditions.hpp"
 
 namespace tfdude {
 namespace {
@@ -20,6 +22,7 @@ struct Token {
   std::string text;  // of a string its content
   int line = 0;
   std::size_t other = 0;  // of a bracket: its counterpart; of others: that which they stand in
+  PythonConditions::Place place = PythonConditions::kNone;
 };
 
 constexpr std::size_t kNone = SIZE_MAX;
@@ -30,7 +33,8 @@ bool is_word(char c) {
 
 class Tokens {
  public:
-  Tokens(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+  Tokens(std::string_view text, const std::string& file, PythonConditions& conditions)
+      : text_(text), file_(file), conditions_(conditions) {}
 
   [[nodiscard]] Result<std::vector<Token>> all() {
     while (at_ < text_.size()) {
@@ -45,12 +49,14 @@ class Tokens {
         if (auto ok = sign(c); !ok) return tl::unexpected(ok.error());
       }
     }
+    conditions_.finish();
     if (open_.empty()) return std::move(tokens_);
     return file_error(Errc::kConfig, file_, tokens_[open_.back()].line, "a bracket is not closed");
   }
 
  private:
   [[nodiscard]] Result<void> string() {
+    begin_line({});
     const std::string_view rest = text_.substr(at_);
     const bool is_long = rest.size() >= 3 && rest[1] == rest[0] && rest[2] == rest[0];
     const std::string quote(is_long ? 3 : 1, rest[0]);
@@ -73,11 +79,29 @@ class Tokens {
 
   void add(Token token) {
     token.other = open_.empty() ? kNone : open_.back();
+    token.place = conditions_.here();
     tokens_.push_back(std::move(token));
+  }
+
+  // Before the first token of a line.
+  void begin_line(std::string_view first) {
+    if (is_line_begun_ || !open_.empty()) return;
+    is_line_begun_ = true;
+    conditions_.begin_line(at_ - line_begin_, first, line_);
+  }
+
+  void end_line() {
+    ++line_;
+    line_begin_ = at_;
+    is_line_begun_ = false;
   }
 
   void word() {
     const std::size_t begin = at_;
+    std::size_t end = begin;
+    while (end < text_.size() && is_word(text_[end])) ++end;
+    begin_line(text_.substr(begin, end - begin));
+    conditions_.word(text_.substr(begin, end - begin), line_);
     while (at_ < text_.size() && is_word(text_[at_])) {
       const bool exponent = text_[at_] == 'e' || text_[at_] == 'E';
       const bool number = std::isdigit(static_cast<unsigned char>(text_[begin])) != 0;
@@ -89,12 +113,20 @@ class Tokens {
   }
 
   [[nodiscard]] Result<void> sign(char c) {
+    const bool is_blank = std::isspace(static_cast<unsigned char>(c)) != 0 || c == '\\';
+    if (!is_blank) begin_line({});
     ++at_;
-    if (c == '\n') ++line_;
-    if (std::isspace(static_cast<unsigned char>(c)) != 0 || c == '\\') return {};
+    if (c == '\n') end_line();
+    if (c == '\\') join_lines();
+    if (is_blank) return {};
+    note(c);
     add({Token::Kind::kSign, std::string(1, c), line_, 0});
-    if (c == '(' || c == '[' || c == '{') open_.push_back(tokens_.size() - 1);
+    if (c == '(' || c == '[' || c == '{') {
+      open_.push_back(tokens_.size() - 1);
+      conditions_.open();
+    }
     if (c != ')' && c != ']' && c != '}') return {};
+    conditions_.close();
     if (open_.empty()) return file_error(Errc::kConfig, file_, line_, "a bracket was not opened");
     tokens_.back().other = open_.back();
     tokens_[open_.back()].other = tokens_.size() - 1;
@@ -102,9 +134,29 @@ class Tokens {
     return {};
   }
 
+  void note(char sign) {
+    if (sign == ',') conditions_.comma();
+    const bool follows_word = !tokens_.empty() && tokens_.back().kind == Token::Kind::kWord;
+    const bool compares = at_ < text_.size() && text_[at_] == '=';
+    if (sign == '=' && follows_word && !compares) {
+      conditions_.keyword(tokens_.back().text, line_);
+    }
+  }
+
+  // A backslash at the end of a line.
+  void join_lines() {
+    if (at_ < text_.size() && text_[at_] == '\r') ++at_;
+    if (at_ >= text_.size() || text_[at_] != '\n') return;
+    ++at_;
+    ++line_;
+  }
+
   std::string_view text_;
   const std::string& file_;
+  PythonConditions& conditions_;
   std::size_t at_ = 0;
+  std::size_t line_begin_ = 0;
+  bool is_line_begun_ = false;
   int line_ = 1;
   std::vector<Token> tokens_;
   std::vector<std::size_t> open_;
@@ -123,10 +175,6 @@ class Calls {
     for (std::size_t i = open + 1; i < tokens_[open].other; ++i) {
       if (is(i, "(") || is(i, "[") || is(i, "{")) {
         i = tokens_[i].other;
-      } else if (is_keyword(i, "condition")) {
-        return file_error(
-            Errc::kInvalidInput, file_, tokens_[i].line,
-            tokens_[named].text + " is started under a condition: write what happens");
       } else if (is_keyword(i, "arguments")) {
         arguments = i + 2;
       }
@@ -157,11 +205,18 @@ class Calls {
                       "an argument is computed by '" + token.text + "': put its value there");
   }
 
+  // The value ends there, and is not a part of a larger one.
+  [[nodiscard]] bool ends(std::size_t i) const { return is(i, ",") || is(i, ")"); }
+
   [[nodiscard]] Result<std::optional<PythonArguments>> value(std::size_t i) const {
-    if (is(i, "[")) return items(i + 1, tokens_[i].other);
-    if (!is_string(i) || i + 1 >= tokens_.size() || tokens_[i + 1].text != ".split") {
-      return computed(i);
+    if (is(i, "[")) {
+      const std::size_t end = tokens_[i].other;
+      return ends(end + 1) ? items(i + 1, end) : computed(end + 1);
     }
+    const bool splits = i + 1 < tokens_.size() && tokens_[i + 1].text == ".split";
+    if (!is_string(i) || !splits || !is(i + 2, "(")) return computed(i);
+    const std::size_t end = tokens_[i + 2].other;
+    if (!ends(end + 1)) return computed(end + 1);
     PythonArguments arguments{{}, tokens_[i].line};
     for (const auto word : words_of(tokens_[i].text)) arguments.words.emplace_back(word);
     return std::optional(std::move(arguments));
@@ -191,14 +246,47 @@ class Calls {
   const std::string& file_;
 };
 
+// Which statements give their value a name, and where a condition decides about the use of it.
+class Variables {
+ public:
+  Variables(const std::vector<Token>& tokens, const PythonConditions& conditions)
+      : conditions_(conditions) {
+    auto statement = PythonConditions::kNone;
+    for (std::size_t i = 0; i + 1 < tokens.size(); ++i) {
+      const Token& token = tokens[i];
+      const auto before = std::exchange(statement, conditions.statement_of(token.place));
+      if (token.kind != Token::Kind::kWord) continue;
+      const bool named = tokens[i + 1].kind == Token::Kind::kSign && tokens[i + 1].text == "=";
+      if (named && statement != before) names_[statement] = token.text;
+      const int line = conditions.line_of(token.place);
+      if (!named && line != 0) decided_.emplace(token.text, line);
+    }
+  }
+
+  // The line of a condition that decides about what a statement gives a name; 0: none.
+  [[nodiscard]] int decided(PythonConditions::Place place) const {
+    const auto name = names_.find(conditions_.statement_of(place));
+    if (name == names_.end()) return 0;
+    const auto use = decided_.find(name->second);
+    return use == decided_.end() ? 0 : use->second;
+  }
+
+ private:
+  const PythonConditions& conditions_;
+  std::unordered_map<PythonConditions::Place, std::string> names_;
+  std::unordered_map<std::string, int> decided_;
+};
+
 }  // namespace
 
 Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
                                                       const std::string& program,
                                                       const std::string& file) {
-  const auto tokens = Tokens(text, file).all();
+  PythonConditions conditions;
+  const auto tokens = Tokens(text, file, conditions).all();
   if (!tokens) return tl::unexpected(tokens.error());
   const Calls calls(*tokens, file);
+  const Variables variables(*tokens, conditions);
   std::vector<PythonArguments> found;
   std::size_t read = kNone;  // each bracket is read once, so that the work is bounded
   for (std::size_t i = 0; i < tokens->size(); ++i) {
@@ -209,6 +297,11 @@ Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
     auto arguments = calls.around(token.other, i);
     if (!arguments) return tl::unexpected(std::move(arguments.error()));
     if (!*arguments) continue;
+    const int decided = conditions.line_of(token.place);
+    if (const int at = decided != 0 ? decided : variables.decided(token.place); at != 0) {
+      return file_error(Errc::kInvalidInput, file, at,
+                        program + " is started under a condition: write what happens");
+    }
     (*arguments)->line = token.line;
     found.push_back(**std::move(arguments));
   }

@@ -15,8 +15,8 @@ struct PythonArguments {
 
 /// Finds the calls that name a program, as in Node(executable='PROGRAM', arguments=['1', 'map']),
 /// without running the file: arguments must be written as they are, in a list or as 'text'.split().
-/// @return kInvalidInput naming file and line: arguments that only Python could compute; kConfig: a
-///   string or bracket without an end
+/// @return kInvalidInput naming file and line: arguments that only Python could compute; a
+///   condition or loop that decides about the call; kConfig: a string or bracket without an end
 [[nodiscard]] Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
                                                                     const std::string& program,
                                                                     const std::string& file);

@@ -13,6 +13,10 @@ namespace {
 // Of a file that is damaged throughout, not every place is told.
 constexpr std::size_t kMostProblems = 20;
 
+// Stamps that differ by more from the times when they were logged are of another clock: as much as
+// live histories have.
+constexpr std::chrono::seconds kOtherClock{10};
+
 bool ends_with(std::string_view text, std::string_view end) {
   return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
 }
@@ -77,10 +81,12 @@ void Cursor::begin_at(std::size_t chunk) {
   first_chunk_ = chunk_ = chunk;
   waiting_.clear();
   decoder_ = {};
+  counts_ = {};
+  transforms_ = {};
+  behind_.reset();
 }
 
 void Cursor::rewind() {
-  left_out_ = 0;
   statics_before_.reset();
   begin_at(0);
 }
@@ -129,6 +135,39 @@ void Cursor::load(const ChunkPlace& chunk) {
   std::stable_sort(
       waiting_.begin(), waiting_.end(),
       [](const RecordedMessage& a, const RecordedMessage& b) { return a.log < b.log; });
+  date_transforms();
+}
+
+// A stamp of 0 was not set: as in the bridge, the value is one of the time of its arrival. If the
+// other stamps are of another clock, a simulation's for example, that is the time which this clock
+// then had: the stamp of the next sample that has one, less what passed in between. After the last
+// such sample it goes on from there.
+void Cursor::date_transforms() {
+  const auto each_sample = [&](auto visit) {
+    for (auto message = waiting_.rbegin(); message != waiting_.rend(); ++message) {
+      auto& values = std::get<RecordedValues>(message->what).values;
+      for (auto value = values.rbegin(); value != values.rend(); ++value) {
+        if (value->value.stamp && !visit(message->log, *value)) return;
+      }
+    }
+  };
+  each_sample([&](Time log, const RecordedValue& value) {
+    if (!value.dated) behind_ = log - *value.value.stamp;
+    return value.dated;
+  });
+  auto behind = behind_.value_or(std::chrono::nanoseconds());
+  each_sample([&](Time log, RecordedValue& value) {
+    if (!value.dated) {
+      behind = log - *value.value.stamp;
+      return true;
+    }
+    const bool other_clock = std::chrono::abs(behind) > kOtherClock;
+    value.value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
+    ++counts_.unstamped;
+    note("frame " + quote(value.edge.id) +
+         ": its messages have no stamp (0): taken as of the time when they were logged");
+    return true;
+  });
 }
 
 void Cursor::add(const Message& message, bool statics_only) {
@@ -153,30 +192,31 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
     case Topic::kEvents:
       return take(decode_event(message.data));
     case Topic::kTf:
-    case Topic::kTfStatic: {
-      if (!foreign_) return {};
-      auto transforms = decode_tf(message.data);
-      if (!transforms) return tl::unexpected(std::move(transforms.error()));
-      for (RecordedValue& value : transforms->values) {
-        if (topic == Topic::kTfStatic) {
-          value.value.stamp.reset();
-        } else if (value.value.stamp == Time()) {
-          // Nobody has set it. As in the bridge, the value is one of the time of its arrival.
-          value.value.stamp = log_of(message);
-          note("frame " + quote(value.edge.id) +
-               ": its messages have no stamp (0): taken as of the time when they were logged");
-        }
-      }
-      left_out_ += transforms->left_out.size();
-      for (std::string& why : transforms->left_out) note(std::move(why));
-      waiting_.push_back(
-          {log_of(message),
-           RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)}, true});
+    case Topic::kTfStatic:
+      if (foreign_) return decode_transforms(topic == Topic::kTfStatic, message);
       return {};
-    }
     case Topic::kKeyframe:
       return {};
   }
+  return {};
+}
+
+Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
+  auto transforms = decode_tf(message.data);
+  if (!transforms) {
+    ++counts_.messages;
+    return tl::unexpected(std::move(transforms.error()));
+  }
+  for (RecordedValue& value : transforms->values) {
+    if (!is_static) continue;
+    value.value.stamp.reset();
+    value.dated = false;
+  }
+  counts_ += transforms->counts;
+  for (std::string& why : transforms->left_out) note(std::move(why));
+  waiting_.push_back({log_of(message),
+                      RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)},
+                      true});
   return {};
 }
 
@@ -190,6 +230,10 @@ std::optional<RecordedMessage> Cursor::next() {
   if (!peek()) return std::nullopt;
   RecordedMessage message = std::move(waiting_.front());
   waiting_.pop_front();
+  if (message.foreign) {
+    transforms_.take(std::get<RecordedValues>(message.what).values, counts_,
+                     [this](std::string problem) { note(std::move(problem)); });
+  }
   return message;
 }
 

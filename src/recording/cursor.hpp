@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "recording/foreign_transforms.hpp"
 #include "recording/mcap_reader.hpp"
 #include "recording/messages.hpp"
 #include "recording/schemas.hpp"
@@ -38,8 +39,8 @@ class Cursor {
   /// What is wrong with the file, as far as it was read.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
-  /// How many invalid transforms of a foreign file were left out since the last start or rewind.
-  [[nodiscard]] std::size_t left_out() const { return left_out_; }
+  /// What was found in the transforms of a foreign file since the last start or rewind.
+  [[nodiscard]] const TransformCounts& counts() const { return counts_; }
 
   /// Goes to the last place, not later than an instant, from which everything is known without
   /// what is before. In a foreign file, transforms that were sent regularly are then left out
@@ -69,6 +70,8 @@ class Cursor {
   void load(const ChunkPlace& chunk);
   void add(const Message& message, bool statics_only);
   [[nodiscard]] Result<void> decode(Topic topic, const Message& message);
+  [[nodiscard]] Result<void> decode_transforms(bool is_static, const Message& message);
+  void date_transforms();
   void note(std::string problem);
 
   McapReader reader_;
@@ -76,7 +79,10 @@ class Cursor {
   std::map<std::uint16_t, Topic> topics_;
   std::size_t topics_known_ = 0;  // channels that were looked at
   std::vector<std::string> problems_;
-  std::size_t left_out_ = 0;
+  TransformCounts counts_;
+  ForeignTransforms transforms_;
+  // How far the stamps of transforms are behind the times when they were logged, most recently.
+  std::optional<std::chrono::nanoseconds> behind_;
   std::optional<Topic> only_;
   std::size_t first_chunk_ = 0;
   std::optional<Time> statics_before_;

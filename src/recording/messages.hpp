@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "tfdude/recording/transform_counts.hpp"
 #include "tfdude/types/change.hpp"
 #include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/partition_news.hpp"
@@ -29,6 +30,7 @@ inline constexpr std::int64_t kMaxTime = 4'000'000'000'000'000'000;
 struct RecordedValue {
   WatchedFrame edge;
   WatchedValue value;  ///< its frame is not used
+  bool dated = false;  ///< of ROS: its stamp was 0, which nobody has set
 };
 
 struct RecordedValues {
@@ -99,6 +101,7 @@ void encode_keyframe(bool ends, std::string& out);
 struct RecordedTransforms {
   std::vector<RecordedValue> values;  ///< their covariance is unspecified
   std::vector<std::string> left_out;  ///< of each invalid transform, what is wrong with it
+  TransformCounts counts;             ///< of these
 };
 
 /// By the rules of the bridge to ROS. @return kState: not a valid message

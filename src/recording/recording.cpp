@@ -240,15 +240,14 @@ class Recording::Impl {
   }
 
   void read_all() {
-    std::size_t left_out = 0;
-    visit(std::nullopt, Time::min(), [&](const RecordedMessage&) {
-      left_out = cursor_.left_out();
-      return true;
-    });
-    left_out_ = left_out;
+    cursor_.rewind();
+    while (cursor_.next()) {
+    }
+    counts_ = cursor_.counts();
+    load(now_, span_);
   }
 
-  [[nodiscard]] std::optional<std::size_t> left_out() const { return left_out_; }
+  [[nodiscard]] const std::optional<TransformCounts>& counts() const { return counts_; }
   [[nodiscard]] const State& state() const { return *state_; }
   [[nodiscard]] const Cursor& cursor() const { return cursor_; }
   [[nodiscard]] Time instant() const { return now_; }
@@ -285,7 +284,7 @@ class Recording::Impl {
   std::chrono::nanoseconds span_ = kHistory;
   std::optional<Time> start_;
   std::optional<Time> end_;
-  std::optional<std::size_t> left_out_;  // if all was read
+  std::optional<TransformCounts> counts_;  // if all was read
 };
 
 Recording::Recording(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -310,9 +309,18 @@ Result<Recording> Recording::read(std::string_view bytes) {
 RecordingSummary Recording::summary() const {
   const Cursor& cursor = impl_->cursor();
   const McapReader& reader = cursor.reader();
-  return {reader.library(),  cursor.foreign(), reader.finished(),      impl_->start(),
-          impl_->end(),      reader.size(),    reader.chunks().size(), reader.message_count(),
-          cursor.problems(), impl_->left_out()};
+  const auto& counts = impl_->counts();
+  return {reader.library(),
+          cursor.foreign(),
+          reader.finished(),
+          impl_->start(),
+          impl_->end(),
+          reader.size(),
+          reader.chunks().size(),
+          reader.message_count(),
+          cursor.problems(),
+          counts ? std::optional(counts->left_out()) : std::nullopt,
+          counts};
 }
 
 void Recording::read_all() { impl_->read_all(); }

@@ -12,11 +12,24 @@ constexpr std::size_t kLeastTransform = 8 + 4 + 4 + 56;
 // Of the name of a frame that is left out.
 constexpr std::size_t kShown = 60;
 
-Result<void> check_edge(const WatchedFrame& edge) {
-  auto ok = check_id(edge.id, "id");
-  if (ok) ok = check_id(edge.parent, "parent");
-  if (ok && edge.id == edge.parent) return fail(Errc::kInvalidInput, "it is its own parent");
-  return ok;
+// What is wrong with a transform, and how many have that.
+struct Fault {
+  Error error;
+  std::size_t& count;
+};
+
+std::optional<Fault> fault_of(const WatchedFrame& edge, std::int32_t seconds,
+                              const Result<Pose>& pose, TransformCounts& counts) {
+  for (auto [id, what] : {std::pair(&edge.id, "id"), std::pair(&edge.parent, "parent")}) {
+    if (auto ok = check_new_id(*id, what); !ok) return Fault{std::move(ok.error()), counts.names};
+  }
+  const auto fault = [](const char* why, std::size_t& count) {
+    return Fault{{Errc::kInvalidInput, why}, count};
+  };
+  if (edge.id == edge.parent) return fault("it is its own parent", counts.values);
+  if (seconds < 0) return fault("its stamp is negative", counts.early);
+  if (!pose) return Fault{pose.error(), counts.values};
+  return std::nullopt;
 }
 
 }  // namespace
@@ -40,15 +53,14 @@ Result<RecordedTransforms> decode_tf(std::string_view message) {
     q.w() = reader.f64();
     if (!reader.good()) break;
     const auto pose = ros::pose_of(q, p);
-    auto ok = check_edge(recorded.edge);
-    if (ok && seconds < 0) ok = fail(Errc::kInvalidInput, "its stamp is negative");
-    if (ok && !pose) ok = tl::unexpected(pose.error());
-    if (!ok) {
+    if (const auto fault = fault_of(recorded.edge, seconds, pose, all.counts)) {
+      ++fault->count;
       all.left_out.push_back("the transform of frame " + quote(recorded.edge.id.substr(0, kShown)) +
-                             " is left out: " + ok.error().message);
+                             " is left out: " + fault->error.message);
       continue;
     }
     recorded.value.stamp = time_of(seconds * kSecond + nanos);
+    recorded.dated = recorded.value.stamp == Time();
     recorded.value.X_PC = {*pose, StatedCovariance::unspecified()};
     all.values.push_back(std::move(recorded));
   }

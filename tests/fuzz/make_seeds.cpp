@@ -83,6 +83,24 @@ void write_detections(const std::filesystem::path& folder) {
   write_wire(folder, MessageType::kArucoMarkers, markers);
 }
 
+void write_places(const std::filesystem::path& folder) {
+  using ros::MessageType;
+  ros::wire::NavSatFix fix;
+  fix.header_().frame_id_("gps");
+  fix.latitude_(48);
+  fix.longitude_(11.5);
+  fix.altitude_(519);
+  fix.position_covariance_()[0] = fix.position_covariance_()[4] = 1;
+  fix.position_covariance_()[8] = 4;
+  fix.position_covariance_type_(2);
+  write_wire(folder, MessageType::kNavSatFix, fix);
+  ros::wire::GeoPose pose;
+  pose.header_().frame_id_("map");
+  pose.pose_().position_().latitude_(48);
+  pose.pose_().orientation_().w_(1);
+  write_wire(folder, MessageType::kGeoPoseStamped, pose);
+}
+
 void write_ros(const std::filesystem::path& folder) {
   using ros::MessageType;
   const ros::RosPose pose{{1, 2, 3}, {0, 0, 0.6, 0.8}};
@@ -97,6 +115,7 @@ void write_ros(const std::filesystem::path& folder) {
   write_ros(folder, MessageType::kOdometry, ros::Odometry{measured, "base", {1, 0, 0}, {}, {}});
   write_ros(folder, MessageType::kClock, ros::ClockTime{time_of(4)});
   write_detections(folder);
+  write_places(folder);
 }
 
 void write_choices(const std::filesystem::path& folder) {

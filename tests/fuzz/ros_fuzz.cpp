@@ -12,6 +12,7 @@
 #include "tfdude-ros/fastdds/convert.hpp"
 #include "tfdude-ros/fastdds/well_formed.hpp"
 #include "tfdude-ros/logic/detections.hpp"
+#include "tfdude-ros/logic/geodetic.hpp"
 #include "tfdude-ros/logic/joints.hpp"
 #include "tfdude-ros/logic/tf_import.hpp"
 
@@ -109,10 +110,23 @@ void seen(MessageType type, const Bytes& bytes, bool well_formed) {
   }
 }
 
+template <class Wire>
+void placed(MessageType type, const Bytes& bytes, bool well_formed) {
+  Wire fresh;
+  const bool taken = ros::read(type, bytes, fresh);
+  demand(!taken || well_formed, "what is not well formed is rejected");
+  if (!taken) return;
+  const ros::GeoPose message = ros::plain(fresh);
+  if (!ros::has_place(message)) return;
+  const auto value = ros::geodetic_message(message, "earth", "gps", {}, {});
+  if (value) return demand_finite(value->X_AB);
+  demand_printable(value.error());
+}
+
 void run(std::uint8_t choice, const Bytes& bytes) {
   const std::uint8_t* data = bytes.data();
   const std::size_t size = bytes.size();
-  switch (choice % 9) {
+  switch (choice % 11) {
     case 0:
       if (const auto tf =
               received<ros::wire::Tf>(MessageType::kTf, bytes, ros::well_formed_tf(data, size))) {
@@ -146,6 +160,12 @@ void run(std::uint8_t choice, const Bytes& bytes) {
     case 7:
       return seen<ros::wire::Markers>(MessageType::kArucoMarkers, bytes,
                                       ros::well_formed_markers(data, size));
+    case 9:
+      return placed<ros::wire::NavSatFix>(MessageType::kNavSatFix, bytes,
+                                          ros::well_formed_nav_sat_fix(data, size));
+    case 10:
+      return placed<ros::wire::GeoPose>(MessageType::kGeoPoseStamped, bytes,
+                                        ros::well_formed_geo_pose(data, size));
     default:
       (void)received<ros::wire::Clock>(MessageType::kClock, bytes,
                                        ros::well_formed_clock(data, size));

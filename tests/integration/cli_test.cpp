@@ -242,6 +242,39 @@ TEST_CASE("cli: every command has help with an example") {
   }
 }
 
+TEST_CASE("cli: an answer that cannot be written is an error") {
+  const ThesisDaemons d;
+  const auto into_full_disk = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {"/bin/sh", "-c", "exec \"$@\" >/dev/full", "sh", TFDUDE_CLI, "--domain",
+                      std::to_string(d.domain.number()), "--profile", TFDUDE_LOOPBACK_PROFILE});
+    testing::Process process(arguments);
+    return testing::finish(process);
+  };
+  // The last ones print until they are interrupted.
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--help"},
+                                             {"--version"},
+                                             {"tree", "--help"},
+                                             {"tree"},
+                                             {"--json", "lookup", "world", "camera"},
+                                             {"watch", "world", "camera"},
+                                             {"tree", "--watch"}}) {
+    CAPTURE(arguments);
+    const CliResult result = into_full_disk(arguments);
+    CHECK(result.status == 1);
+    CHECK_THAT(result.err, ContainsSubstring("tfdude: standard output: "));
+  }
+}
+
+TEST_CASE("cli: export says that no partition answers") {
+  const testing::TestDomain domain;
+  const CliResult result = domain.cli({"--timeout", "300", "export", "-", "--format", "ros2"});
+  CHECK(result.status == 3);
+  CHECK(result.out.empty());
+  CHECK_THAT(result.err, ContainsSubstring("no partition answers in domain"));
+}
+
 TEST_CASE("cli: help lists lookup first, and the options of all commands last") {
   const testing::TestDomain domain;
   const std::string help = domain.cli({"--help"}).out;

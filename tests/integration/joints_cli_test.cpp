@@ -102,6 +102,15 @@ TEST_CASE("joints: wrong input is rejected by name and changes nothing") {
   }
   CHECK(robot.domain.cli({"joint", "elbow_joint"}).status == 2);
   CHECK(robot.domain.cli({"joint", "elbow_joint", "much"}).status == 2);
+  for (const std::vector<std::string>& typed :
+       std::vector<std::vector<std::string>>{{"joint", "elbow_joint=0x1"},
+                                             {"joint", "elbow_joint", "0x1"},
+                                             {"joint", "elbow_joint=0x1p-2"}}) {
+    const CliResult result = robot.domain.cli(typed);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, ContainsSubstring("joint 'elbow_joint': '0x1") &&
+                               ContainsSubstring("is not a number"));
+  }
   CHECK_FALSE(robot.joint("elbow_joint").at("measured").get<bool>());
 }
 

@@ -105,7 +105,11 @@ values_in:
     edge: odom
     covariance: {all_zero: exact, zero: none, minus_one: none, none_from: 9999,
                  per_metre: [0, 0, 0.1, 0, 0, 0]}
-poses_in: [{topic: /gps, child: base_link, covariance: {stddev: [1, 1, 2, 3, 3, 3]}}]
+  - {topic: /fix, type: navsat, child: gps, frame: site/earth}
+  - {topic: /geopose, type: geopose, child: base_link, edge: map}
+poses_in:
+  - {topic: /gps, child: base_link, covariance: {stddev: [1, 1, 2, 3, 3, 3]}}
+  - {topic: /fix, type: navsat, child: base_link}
 detections_in:
   - {topic: /tags, type: isaac_apriltag, ids: ["7"], except: ["70"], under: odom, gate: 0.9,
      drop_after: 5, frame: "t{}"}
@@ -119,7 +123,15 @@ detections_in:
         Covariance::from_stddev({0.1, 0.1, 0, 0, 0, 0.2})->upper());
   CHECK(import_of(settings).drifts.count("wheel") == 1);
   CHECK(!import_of(settings).frames.takes("x"));
-  REQUIRE(settings.values_in.size() == 2);
+  REQUIRE(settings.values_in.size() == 4);
+  CHECK(settings.values_in[2].geodetic == MessageType::kNavSatFix);
+  CHECK(settings.values_in[2].frame == "site/earth");
+  CHECK(settings.values_in[3].geodetic == MessageType::kGeoPoseStamped);
+  CHECK(settings.values_in[3].frame == "earth");
+  CHECK(settings.values_in[3].edge == "map");
+  CHECK_FALSE(settings.values_in[0].geodetic);
+  REQUIRE(settings.poses_in.size() == 2);
+  CHECK(settings.poses_in[1].geodetic == MessageType::kNavSatFix);
   CHECK(settings.values_in[0].odometry);
   CHECK(settings.values_in[0].prefix == "r1/");
   const ValueIn& amcl = settings.values_in[1];
@@ -145,6 +157,12 @@ detections_in:
   CHECK(settings.detections_in[2].frame == "tag_{}");
 
   CHECK_THAT(error_of("values_in: [{topic: /p}]\n"), ContainsSubstring("child is missing"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, type: navsat}]\n"),
+             ContainsSubstring("child is missing"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, type: navsat, child: a, edge: b}]\n"),
+             ContainsSubstring("a position only"));
+  CHECK_THAT(error_of("values_in: [{topic: /p, child: a, frame: earth}]\n"),
+             ContainsSubstring("frame is only for navsat and geopose"));
   CHECK_THAT(error_of("values_in: [{topic: /p, child: a, edge: a}]\n"),
              ContainsSubstring("leave it out"));
   CHECK_THAT(error_of("values_in: [{topic: /p, child: a, covariance: {zero: odd}}]\n"),

@@ -296,4 +296,57 @@ TEST_CASE("ros values: each array of detections makes frames below the camera") 
   CHECK(std::abs(variance("tag36h11:3") - 0.04) < 1e-12);
 }
 
+// A receiver and a localisation of another vendor: places on the Earth.
+TEST_CASE("ros values: a fix and a geodetic pose place frames on the Earth") {
+  const RosRig rig;
+  const testing::TemporaryDirectory files;
+  auto bridge = rig.start_bridge(
+      {"--config", files.write("b.yaml",
+                               "values_in:\n"
+                               "  - {topic: /fix, type: navsat, child: gps}\n"
+                               "  - {topic: /geopose, type: geopose, child: map}\n"
+                               "poses_in: [{topic: /measured, type: navsat, child: gps}]\n")});
+  RosPeer peer(rig.ros_domain());
+  peer.advertise("/fix", "navsat", "reliable");
+  peer.advertise("/geopose", "geopose", "reliable");
+  Client client = rig.client();
+  const std::string stamp = std::to_string(nanoseconds(at(0)));
+  peer.publish("/fix", stamp + " gps_link -1 48 11.5 519 2 4");
+  peer.publish("/fix", stamp + " gps_link 0 nan 11.5 519 2 4");
+  peer.publish("/fix", stamp + " gps_link 2 48 11.5 519 2 4");
+  peer.publish("/geopose", stamp + " any 48 11.5 519 0 0 0.6 0.8");
+  REQUIRE(eventually([&] {
+    return client.lookup("earth", "gps").has_value() && client.lookup("earth", "map").has_value();
+  }));
+  const auto X_EG = client.lookup("earth", "gps", Query{});
+  REQUIRE(X_EG);
+  CHECK(X_EG->stamp == at(0));
+  // By the closed form for WGS84, in Python.
+  const Eigen::Vector3d expected(4190221.812989198, 852510.2629479947, 4717262.022279829);
+  CHECK((X_EG->pose.translation() - expected).norm() < 1e-6);
+  const Matrix6d sigma = X_EG->covariance.of_specified().matrix();
+  CHECK((sigma.topLeftCorner<3, 3>() - 4 * Eigen::Matrix3d::Identity()).norm() < 1e-9);
+  // Both are at one place: the map is turned to the north.
+  const auto X_GM = client.lookup("gps", "map");
+  REQUIRE(X_GM);
+  CHECK(X_GM->pose.translation().norm() < 1e-6);
+  CHECK(std::abs(X_GM->pose.rotation().z() - 0.6) < 1e-9);
+  CHECK_FALSE(X_GM->covariance.complete());
+  // Another receiver measures the same place, once: both together are twice as certain.
+  peer.advertise("/measured", "navsat", "reliable");
+  for (int i = 0; i < 2; ++i) peer.publish("/measured", stamp + " gps_link 2 48 11.5 519 2 4");
+  peer.publish("/measured", stamp + " gps_link 2 48 11.5 519 0 0");
+  REQUIRE(eventually([&] {
+    const auto X = client.lookup("earth", "gps", Query{});
+    return X && std::abs(X->covariance.of_specified().matrix()(0, 0) - 2) < 1e-6;
+  }));
+  bridge.signal(SIGTERM);
+  REQUIRE(bridge.wait(testing::in_time()) == 0);
+  CHECK_THAT(bridge.err(), ContainsSubstring("/fix: values taken=1 failed=0 without a place=2"));
+  CHECK_THAT(bridge.err(), ContainsSubstring("/geopose: values taken=1 failed=0"));
+  CHECK_THAT(bridge.err(),
+             ContainsSubstring("/measured: accepted=1 rejected by the gate=0 failed=1 without a "
+                               "place=0; of their stamps: unstamped=0 same=1"));
+}
+
 }  // namespace tfdude

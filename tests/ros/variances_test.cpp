@@ -1,8 +1,8 @@
-#include "tfdude-ros/logic/variances.hpp"
-
 #include <cmath>
 #include <limits>
 #include <string>
+
+#include "tfdude/math/ros_variances.hpp"
 
 #include "support/catch.hpp"
 #include "tfdude-ros/logic/names.hpp"

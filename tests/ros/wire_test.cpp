@@ -89,6 +89,68 @@ TEST_CASE("ros wire: the other messages survive the way, and damaged ones are re
   check_robust(MessageType::kClock, generated(ClockTime{time_of(9)}));
 }
 
+TEST_CASE("ros wire: places on the Earth are read as receivers send them") {
+  // Plain CDR, as a node of ROS sends it: header, status and service, coordinates, covariance.
+  const auto hex = [](std::string_view digits) {
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t i = 0; i + 1 < digits.size(); i += 2) {
+      bytes.push_back(
+          static_cast<std::uint8_t>(std::stoi(std::string(digits.substr(i, 2)), nullptr, 16)));
+    }
+    return bytes;
+  };
+  const auto bytes =
+      hex("00010000"  // little-endian
+          "07000000"
+          "f4010000"
+          "04000000"
+          "67707300"  // 7 s, 500 ns, "gps"
+          "ff000900"
+          "00000000"  // status -1, service 9
+          "0000000000004840"
+          "0000000000002740"
+          "0000000000388040"  // 48, 11.5, 519
+          "000000000000f03f"
+          "0000000000000000"
+          "0000000000000000"
+          "0000000000000000"
+          "0000000000000040"
+          "0000000000000000"
+          "0000000000000000"
+          "0000000000000000"
+          "0000000000001040"
+          "02");
+  wire::NavSatFix fix;
+  REQUIRE(read(MessageType::kNavSatFix, bytes, fix));
+  auto out = plain(fix);
+  CHECK(out.stamp == time_of(7'000'000'500));
+  CHECK(out.frame == "gps");
+  CHECK(out.place == std::array<double, 3>{48, 11.5, 519});
+  CHECK_FALSE(out.fixed);
+  CHECK_FALSE(out.quat);
+  REQUIRE(out.covariance);
+  CHECK((*out.covariance)[4] == 2);
+  CHECK((*out.covariance)[8] == 4);
+  fix.status_().status_(2);
+  fix.position_covariance_type_(0);
+  out = plain(fix);
+  CHECK(out.fixed);
+  CHECK_FALSE(out.covariance);
+  check_robust(MessageType::kNavSatFix, fix);
+
+  wire::GeoPose pose;
+  pose.header_().frame_id_("map");
+  pose.pose_().position_().longitude_(151);
+  pose.pose_().orientation_().z_(1);
+  wire::GeoPose back;
+  REQUIRE(read(MessageType::kGeoPoseStamped, bytes_of(MessageType::kGeoPoseStamped, pose), back));
+  const auto place = plain(back);
+  CHECK(place.place[1] == 151);
+  CHECK((*place.quat)[2] == 1);
+  CHECK(place.fixed);
+  check_robust(MessageType::kGeoPoseStamped, pose);
+}
+
 TEST_CASE("ros wire: an object of Detection3DArray is its track, or its most probable class") {
   wire::Detections message;
   message.header_().frame_id_("camera");
@@ -158,6 +220,8 @@ TEST_CASE("ros wire: types have the names that ROS 2 gives them") {
   CHECK(name(MessageType::kPoseWithCovarianceStamped) ==
         "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_");
   CHECK(name(MessageType::kOdometry) == "nav_msgs::msg::dds_::Odometry_");
+  CHECK(name(MessageType::kNavSatFix) == "sensor_msgs::msg::dds_::NavSatFix_");
+  CHECK(name(MessageType::kGeoPoseStamped) == "geographic_msgs::msg::dds_::GeoPoseStamped_");
   CHECK(name(MessageType::kDetection3DArray) == "vision_msgs::msg::dds_::Detection3DArray_");
   CHECK(name(MessageType::kAprilTagDetectionArray) ==
         "isaac_ros_apriltag_interfaces::msg::dds_::AprilTagDetectionArray_");

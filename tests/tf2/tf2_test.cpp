@@ -209,8 +209,31 @@ TEST_CASE("tf2: the covariance of a pose is turned, and that of the path is adde
   // Zeros say that nothing is known, and stay.
   pose.pose.covariance = {};
   CHECK(robot.buffer.transform(pose, "map").pose.covariance[0] == 0);
+  // As the bridge reads them: -1 at first says the same, and stays.
   pose.pose.covariance[0] = -1;
+  CHECK(robot.buffer.transform(pose, "map").pose.covariance[0] == -1);
+  CHECK(robot.buffer.transform(pose, "map").pose.pose.position.y == Approx(5));
+  pose.pose.covariance[0] = -2;
   CHECK_THROWS_AS((void)robot.buffer.transform(pose, "map"), tf2::InvalidArgumentException);
+}
+
+TEST_CASE("tf2: of an axis with the largest variance, or with -1, nothing is known") {
+  Robot robot;
+  REQUIRE(robot.node.update("leader", moved(2, 2, std::acos(-1.0) / 2, 0)));
+  geometry_msgs::msg::PoseWithCovarianceStamped pose;
+  pose.header.frame_id = "leader";
+  pose.pose.covariance[0] = 0.04;
+  pose.pose.covariance[7] = std::numeric_limits<double>::max();
+  pose.pose.covariance[1] = pose.pose.covariance[6] = 0.01;
+  pose.pose.covariance[14] = -1;
+  pose.pose.covariance[35] = std::numeric_limits<double>::infinity();
+  const auto seen = robot.buffer.transform(pose, "map").pose.covariance;
+  // 1 km and 10 rad, and no correlation with other axes; the leader's y is along -x.
+  CHECK(seen[0] == Approx(1e6));
+  CHECK(seen[7] == Approx(0.04));
+  CHECK(seen[14] == Approx(1e6));
+  CHECK(seen[35] == Approx(1e2));
+  CHECK(std::abs(seen[1]) < 1e-6);
 }
 
 }  // namespace tfdude

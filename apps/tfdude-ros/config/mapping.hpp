@@ -98,6 +98,18 @@ class Mapping : private YamlFields {
   }
   // "pose" or "odometry"
   Mapping& type(bool& odometry) { return either("type", "pose", "odometry", odometry); }
+  // Also a place on the Earth, and its frame.
+  Mapping& type(bool& odometry, std::optional<MessageType>& geodetic, std::string& frame) {
+    std::string word = "pose";
+    words("type", word).words("frame", frame);
+    odometry = word == "odometry";
+    if (word == "navsat") geodetic = MessageType::kNavSatFix;
+    if (word == "geopose") geodetic = MessageType::kGeoPoseStamped;
+    return check(odometry || geodetic || word == "pose", Errc::kInvalidInput,
+                 ": type is neither pose nor odometry, navsat or geopose")
+        .check(geodetic || !has("frame"), Errc::kInvalidInput,
+               ": frame is only for navsat and geopose: the messages name theirs");
+  }
   // A rule for all entries together. @param broken  follows the place in the error
   Mapping& check(bool good, Errc code, const std::string& broken) {
     return good ? *this : fail(code, place_ + broken);

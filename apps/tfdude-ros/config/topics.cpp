@@ -39,18 +39,20 @@ Result<void> variances(const std::string& file, const YAML::Node* node, const st
 }  // namespace
 
 Result<void> values_in(const Section& section, Settings& settings) {
-  constexpr std::array<Key, 5> kKeys = {"topic", "type", "child", "edge", "covariance"};
+  constexpr std::array<Key, 6> kKeys = {"topic", "type", "frame", "child", "edge", "covariance"};
   const auto read = [&](ValueIn& in, const YAML::Node& node, const std::string& place) {
     Mapping entries(section.file, node, kKeys, place);
     entries.require("topic")
         .words("topic", in.topic)
         .words("child", in.child)
         .words("edge", in.edge)
-        .type(in.odometry);
+        .type(in.odometry, in.geodetic, in.frame);
     entries.check(in.odometry || !in.child.empty(), Errc::kInvalidInput,
                   ": child is missing, the frame whose pose this is");
     entries.check(in.edge.empty() || in.edge != in.child, Errc::kInvalidInput,
                   ": edge is the child itself: leave it out");
+    entries.check(in.edge.empty() || in.geodetic != MessageType::kNavSatFix, Errc::kInvalidInput,
+                  ": edge needs a pose, and navsat is a position only");
     if (!entries.result()) return entries.result();
     return variances(section.file, entries.value("covariance"), place, in.variances);
   };
@@ -94,7 +96,7 @@ Result<void> detections_in(const Section& section, Settings& settings) {
 }
 
 Result<void> poses_in(const Section& section, Settings& settings) {
-  constexpr std::array<Key, 6> kKeys = {"topic", "type",       "child",
+  constexpr std::array<Key, 7> kKeys = {"topic", "type",       "frame",     "child",
                                         "gate",  "correlated", "covariance"};
   const auto read = [&](PoseIn& in, const YAML::Node& node, const std::string& place) {
     bool correlated = false;
@@ -104,7 +106,7 @@ Result<void> poses_in(const Section& section, Settings& settings) {
         .words("child", in.child)
         .within("gate", 1e-9, 1, in.options.gate)
         .flag("correlated", correlated)
-        .type(in.odometry);
+        .type(in.odometry, in.geodetic, in.frame);
     entries.check(in.odometry == in.child.empty(), Errc::kInvalidInput,
                   in.odometry ? ": odometry names the child itself"
                               : ": child is missing, the frame that is measured");

@@ -97,6 +97,24 @@ Odometry plain(wire::Odometry& message) {
           message.twist_().covariance_()};
 }
 
+GeoPose plain(wire::NavSatFix& message) {
+  GeoPose out{plain_time(message.header_().stamp_()),
+              std::move(message.header_().frame_id_()),
+              {message.latitude_(), message.longitude_(), message.altitude_()}};
+  if (message.position_covariance_type_() != 0) out.covariance = message.position_covariance_();
+  out.fixed = static_cast<std::int8_t>(message.status_().status_()) >= 0;
+  return out;
+}
+
+GeoPose plain(wire::GeoPose& message) {
+  const auto& p = message.pose_().position_();
+  const auto& q = message.pose_().orientation_();
+  return {plain_time(message.header_().stamp_()),
+          std::move(message.header_().frame_id_()),
+          {p.latitude_(), p.longitude_(), p.altitude_()},
+          std::array<double, 4>{q.x_(), q.y_(), q.z_(), q.w_()}};
+}
+
 Detections plain(wire::Detections& message) {
   Detections out{
       plain_time(message.header_().stamp_()), std::move(message.header_().frame_id_()), {}};

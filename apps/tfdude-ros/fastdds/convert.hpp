@@ -13,6 +13,8 @@ using JointState = sensor_msgs::msg::dds_::JointState_;
 using String = std_msgs::msg::dds_::String_;
 using Pose = geometry_msgs::msg::dds_::PoseWithCovarianceStamped_;
 using Odometry = nav_msgs::msg::dds_::Odometry_;
+using NavSatFix = sensor_msgs::msg::dds_::NavSatFix_;
+using GeoPose = geographic_msgs::msg::dds_::GeoPoseStamped_;
 using Detections = vision_msgs::msg::dds_::Detection3DArray_;
 using Tags = isaac_ros_apriltag_interfaces::msg::dds_::AprilTagDetectionArray_;
 using Markers = ros2_aruco_interfaces::msg::dds_::ArucoMarkers_;
@@ -24,6 +26,8 @@ using Clock = rosgraph_msgs::msg::dds_::Clock_;
 [[nodiscard]] Text plain(wire::String& message);
 [[nodiscard]] PoseWithCovariance plain(wire::Pose& message);
 [[nodiscard]] Odometry plain(wire::Odometry& message);
+[[nodiscard]] GeoPose plain(wire::NavSatFix& message);
+[[nodiscard]] GeoPose plain(wire::GeoPose& message);
 /// An object's id is that of its track; without one, its most probable class.
 [[nodiscard]] Detections plain(wire::Detections& message);
 [[nodiscard]] Detections plain(wire::Tags& message);

@@ -35,6 +35,11 @@ using ClockKind =
     Kind<wire::Clock, ClockTime, rosgraph_msgs::msg::dds_::Clock_PubSubType, well_formed_clock>;
 
 // Those that are only read.
+using NavSatFixKind = Kind<wire::NavSatFix, GeoPose, sensor_msgs::msg::dds_::NavSatFix_PubSubType,
+                           well_formed_nav_sat_fix>;
+using GeoPoseKind =
+    Kind<wire::GeoPose, GeoPose, geographic_msgs::msg::dds_::GeoPoseStamped_PubSubType,
+         well_formed_geo_pose>;
 using DetectionsKind =
     Kind<wire::Detections, Detections, vision_msgs::msg::dds_::Detection3DArray_PubSubType,
          well_formed_detections>;
@@ -59,6 +64,10 @@ auto with_kind(MessageType type, Call call) {
       return call(PoseKind{});
     case MessageType::kOdometry:
       return call(OdometryKind{});
+    case MessageType::kNavSatFix:
+      return call(NavSatFixKind{});
+    case MessageType::kGeoPoseStamped:
+      return call(GeoPoseKind{});
     case MessageType::kDetection3DArray:
       return call(DetectionsKind{});
     case MessageType::kAprilTagDetectionArray:
@@ -130,7 +139,8 @@ std::unique_ptr<edds::DataReaderListener> reading(MessageType type, Take take,
 std::unique_ptr<Publisher> writing(MessageType type, edds::Publisher& publisher,
                                    edds::DataWriter& writer) {
   return with_kind(type, [&](auto kind) -> std::unique_ptr<Publisher> {
-    if constexpr (std::is_same_v<typename decltype(kind)::Plain, Detections>) {
+    using Plain = typename decltype(kind)::Plain;
+    if constexpr (std::is_same_v<Plain, Detections> || std::is_same_v<Plain, GeoPose>) {
       return nullptr;
     } else {
       return std::make_unique<Writing<decltype(kind)>>(publisher, writer);

@@ -74,6 +74,23 @@ bool well_formed_odometry(const std::uint8_t* data, std::size_t size) {
   return counted(in);
 }
 
+bool well_formed_nav_sat_fix(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  header(in);
+  in.skip(1, 1);
+  in.skip(2, 2);
+  doubles(in, 3 + 9);
+  in.skip(1, 1);
+  return counted(in);
+}
+
+bool well_formed_geo_pose(const std::uint8_t* data, std::size_t size) {
+  CdrReader in(data, size);
+  header(in);
+  doubles(in, kPose);
+  return counted(in);
+}
+
 bool well_formed_detections(const std::uint8_t* data, std::size_t size) {
   CdrReader in(data, size);
   header(in);

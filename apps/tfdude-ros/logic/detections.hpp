@@ -9,12 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/math/ros_variances.hpp"
+
 #include "../messages.hpp"
 #include "../ros_domain.hpp"
 #include "names.hpp"
 #include "poses.hpp"
 #include "stamps.hpp"
-#include "variances.hpp"
 
 // Objects that cameras see, as frames. No DDS, no threads and no clock.
 namespace tfdude::ros {

@@ -2,6 +2,7 @@
 
 #include "tfdude/math/perturbation.hpp"
 
+#include "geodetic.hpp"
 #include "names.hpp"
 #include "stamps.hpp"
 
@@ -9,6 +10,12 @@ namespace tfdude::ros {
 namespace {
 
 using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+// Without a covariance it cannot be weighed.
+Result<Measurement> with_weight(Result<Measurement> measured) {
+  if (!measured || measured->X_AB.covariance.complete()) return measured;
+  return fail(Errc::kInvalidInput, "covariance: the message has none");
+}
 
 }  // namespace
 
@@ -61,9 +68,11 @@ Result<Measurement> pose_message(const PoseWithCovariance& message, const std::s
 
 Result<Measurement> measurement_of(const PoseIn& in, const PoseWithCovariance& message,
                                    const std::string& child) {
-  auto out = pose_message(message, child, in.prefix, in.variances);
-  if (!out || out->X_AB.covariance.complete()) return out;
-  return fail(Errc::kInvalidInput, "covariance: the message has none");
+  return with_weight(pose_message(message, child, in.prefix, in.variances));
+}
+
+Result<Measurement> measurement_of(const PoseIn& in, const GeoPose& message) {
+  return with_weight(geodetic_message(message, in.frame, in.child, in.prefix, in.variances));
 }
 
 }  // namespace tfdude::ros

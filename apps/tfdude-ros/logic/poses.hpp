@@ -6,10 +6,11 @@
 
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/observation.hpp"
+#include "tfdude/math/ros_variances.hpp"
 #include "tfdude/types/query.hpp"
 
 #include "../messages.hpp"
-#include "variances.hpp"
+#include "../ros_domain.hpp"
 
 // Poses with covariance. ROS's covariance is about axes parallel to those of the header's frame,
 // ours is that of the right perturbation, in the child frame (docs/uncertainty.md).
@@ -33,6 +34,8 @@ struct PoseIn {
   std::string prefix{};
   ObserveOptions options{};
   Variances variances{};
+  std::optional<MessageType> geodetic{};  ///< kNavSatFix or kGeoPoseStamped
+  std::string frame{"earth"};             ///< of these: the earth's; the others name it themselves
 };
 
 /// @param now  the stamp of a path that is static
@@ -66,5 +69,7 @@ struct Measurement {
 [[nodiscard]] Result<Measurement> measurement_of(const PoseIn& in,
                                                  const PoseWithCovariance& message,
                                                  const std::string& child);
+/// @return as geodetic_message(); also if the message has no covariance.
+[[nodiscard]] Result<Measurement> measurement_of(const PoseIn& in, const GeoPose& message);
 
 }  // namespace tfdude::ros

@@ -4,10 +4,11 @@
 #include <string>
 
 #include "tfdude/base/result.hpp"
+#include "tfdude/math/ros_variances.hpp"
 
 #include "../messages.hpp"
+#include "../ros_domain.hpp"
 #include "poses.hpp"
-#include "variances.hpp"
 
 // Poses of ROS as values of edges: a filter's estimate replaces the one before. No DDS, no threads
 // and no clock.
@@ -23,6 +24,8 @@ struct ValueIn {
   std::string edge{};
   std::string prefix{};
   Variances variances{};
+  std::optional<MessageType> geodetic{};  ///< kNavSatFix or kGeoPoseStamped
+  std::string frame{"earth"};             ///< of these: the earth's; the others name it themselves
 };
 
 /// What a message says of the path from its frame to the child.
@@ -30,10 +33,13 @@ struct ValueIn {
 [[nodiscard]] Result<Measurement> value_of(const ValueIn& in, const PoseWithCovariance& message,
                                            const std::string& child);
 
+[[nodiscard]] Result<Measurement> value_of(const ValueIn& in, const GeoPose& message);
+
 /// The value of the child's own edge, as a transform of /tf that has a covariance.
 /// @return as value_of()
 [[nodiscard]] Result<TransformStamped> transform_of(const ValueIn& in,
                                                     const PoseWithCovariance& message,
                                                     const std::string& child);
+[[nodiscard]] Result<TransformStamped> transform_of(const ValueIn& in, const GeoPose& message);
 
 }  // namespace tfdude::ros

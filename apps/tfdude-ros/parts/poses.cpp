@@ -7,6 +7,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "../logic/geodetic.hpp"
+
 namespace tfdude::ros {
 namespace {
 
@@ -90,13 +92,16 @@ void PoseSender::log_once(const std::string& why) {
 }
 
 Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
-  const Topic topic =
-      settings_.odometry ? odometry_topic(settings_.topic) : pose_topic(settings_.topic);
+  const Topic topic = settings_.geodetic   ? geodetic_topic(settings_.topic, *settings_.geodetic)
+                      : settings_.odometry ? odometry_topic(settings_.topic)
+                                           : pose_topic(settings_.topic);
   return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {
     if (source.bridge && is_own(*source.bridge)) return;
     worker_.post([this, taken = std::move(message)] {
       if (const auto* odometry = std::get_if<Odometry>(&taken)) {
         take(odometry->pose, odometry->child);
+      } else if (const auto* place = std::get_if<GeoPose>(&taken)) {
+        take(*place);
       } else {
         take(std::get<PoseWithCovariance>(taken), settings_.child);
       }
@@ -107,29 +112,44 @@ Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
 void PoseObserver::stop() {
   worker_.stop();
   spdlog::info(
-      "{}: accepted={} rejected by the gate={} failed={}; of their stamps: {}; dropped messages={}",
-      settings_.topic, accepted_, rejected_, failed_, stamps_.summary(), worker_.dropped());
+      "{}: accepted={} rejected by the gate={} failed={} without a place={}; of their stamps: {}; "
+      "dropped messages={}",
+      settings_.topic, accepted_, rejected_, failed_, placeless_, stamps_.summary(),
+      worker_.dropped());
 }
 
 void PoseObserver::take(const PoseWithCovariance& message, const std::string& child) {
   // The same measurement twice would count as two.
   if (last_ && is_repeat(message, *last_)) return stamps_.same();
-  if (!given_stamp(message.stamp)) {
+  if (observe(measurement_of(settings_, message, child))) last_ = message;
+}
+
+void PoseObserver::take(const GeoPose& message) {
+  if (!has_place(message)) {
+    ++placeless_;
+    return;
+  }
+  if (last_place_ && is_repeat(message, *last_place_)) return stamps_.same();
+  if (observe(measurement_of(settings_, message))) last_place_ = message;
+}
+
+bool PoseObserver::observe(const Result<Measurement>& measured) {
+  if (measured && !measured->stamp) {
     const auto report = stamps_.unstamped(settings_.topic, "observed at the latest common time");
     if (report) spdlog::warn("{}", *report);
   }
-  const auto observed = measurement_of(settings_, message, child).and_then([&](const auto& one) {
+  const auto observed = measured.and_then([&](const Measurement& one) {
     return node_.observe(one.a, one.b, one.X_AB, one.stamp, settings_.options);
   });
   if (observed) {
-    last_ = message;
     ++(observed->accepted ? accepted_ : rejected_);
     logged_.clear();
-    return;
+    return true;
   }
   ++failed_;
   const std::string& why = observed.error().message;
   if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+  return false;
 }
 
 }  // namespace tfdude::ros

@@ -59,15 +59,20 @@ class PoseObserver {
 
  private:
   void take(const PoseWithCovariance& message, const std::string& child);
+  void take(const GeoPose& message);
+  /// @return whether the partitions have answered
+  bool observe(const Result<Measurement>& measured);
 
   Node& node_;
   const PoseIn settings_;
   std::uint64_t accepted_ = 0;
   std::uint64_t rejected_ = 0;  // by the gate
   std::uint64_t failed_ = 0;
+  std::uint64_t placeless_ = 0;
   std::string logged_;
   StampReports stamps_;
   std::optional<PoseWithCovariance> last_;
+  std::optional<GeoPose> last_place_;
   cli::Worker worker_{100};  // last: it uses the other members
 };
 

@@ -6,6 +6,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "../logic/geodetic.hpp"
+
 namespace tfdude::ros {
 namespace {
 
@@ -15,14 +17,17 @@ constexpr Milliseconds kPatience{1000};
 }  // namespace
 
 Result<void> ValueTaker::start(RosDomain& domain, const IsNeighbour& is_own) {
-  const Topic topic =
-      settings_.odometry ? odometry_topic(settings_.topic) : pose_topic(settings_.topic);
+  const Topic topic = settings_.geodetic   ? geodetic_topic(settings_.topic, *settings_.geodetic)
+                      : settings_.odometry ? odometry_topic(settings_.topic)
+                                           : pose_topic(settings_.topic);
   return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {
     if (source.bridge && is_own(*source.bridge)) return;
     worker_.post([this, taken = std::move(message), writer = source.guid] {
       if (const auto* odometry = std::get_if<Odometry>(&taken)) {
         const bool named = settings_.child.empty();
         take(odometry->pose, named ? odometry->child : settings_.child, writer);
+      } else if (const auto* place = std::get_if<GeoPose>(&taken)) {
+        take(*place, writer);
       } else {
         take(std::get<PoseWithCovariance>(taken), settings_.child, writer);
       }
@@ -32,18 +37,26 @@ Result<void> ValueTaker::start(RosDomain& domain, const IsNeighbour& is_own) {
 
 void ValueTaker::stop() {
   worker_.stop();
-  spdlog::info("{}: values taken={} failed={}; dropped messages={}", settings_.topic, taken_,
-               failed_, worker_.dropped());
+  spdlog::info("{}: values taken={} failed={} without a place={}; dropped messages={}",
+               settings_.topic, taken_, failed_, placeless_, worker_.dropped());
 }
 
 void ValueTaker::take(const PoseWithCovariance& message, const std::string& child,
                       const std::string& writer) {
-  const auto done = [&]() -> Result<void> {
-    if (!settings_.edge.empty()) return determine(message, child);
-    return transform_of(settings_, message, child).map([&](const TransformStamped& value) {
-      frames_.take({value}, writer);
-    });
-  }();
+  count(settings_.edge.empty() ? replace(transform_of(settings_, message, child), writer)
+                               : determine(value_of(settings_, message, child), message.frame));
+}
+
+void ValueTaker::take(const GeoPose& message, const std::string& writer) {
+  if (!has_place(message)) {
+    ++placeless_;
+    return;
+  }
+  count(settings_.edge.empty() ? replace(transform_of(settings_, message), writer)
+                               : determine(value_of(settings_, message), settings_.frame));
+}
+
+void ValueTaker::count(const Result<void>& done) {
   if (done) {
     ++taken_;
     logged_.clear();
@@ -54,8 +67,13 @@ void ValueTaker::take(const PoseWithCovariance& message, const std::string& chil
   if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
 }
 
-Result<void> ValueTaker::determine(const PoseWithCovariance& message, const std::string& child) {
-  auto value = value_of(settings_, message, child);
+Result<void> ValueTaker::replace(const Result<TransformStamped>& value, const std::string& writer) {
+  if (!value) return tl::unexpected(value.error());
+  frames_.take({*value}, writer);
+  return {};
+}
+
+Result<void> ValueTaker::determine(Result<Measurement> value, const std::string& frame) {
   if (!value) return tl::unexpected(std::move(value.error()));
   const auto edge = id_of(settings_.edge, settings_.prefix);
   if (!edge) return tl::unexpected(edge.error());
@@ -72,7 +90,7 @@ Result<void> ValueTaker::determine(const PoseWithCovariance& message, const std:
                                          quote(*edge) + " to " + quote(value->b));
   }
   const Pose X_AE = value->X_AB.pose * X_EB->pose.inverse();
-  frames_.hold({*stamp, message.frame, settings_.edge, ros_pose_of(X_AE)});
+  frames_.hold({*stamp, frame, settings_.edge, ros_pose_of(X_AE)});
   return node_.determine(*edge, value->a, value->b, value->X_AB, *stamp).map([](const auto&) {});
 }
 

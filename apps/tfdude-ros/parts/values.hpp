@@ -26,14 +26,21 @@ class ValueTaker {
 
  private:
   void take(const PoseWithCovariance& message, const std::string& child, const std::string& writer);
+  void take(const GeoPose& message, const std::string& writer);
+  /// Takes the value of the child's own edge.
+  [[nodiscard]] Result<void> replace(const Result<TransformStamped>& value,
+                                     const std::string& writer);
   /// The edge of the frame above the child, by the child's pose in that frame at the same instant.
-  [[nodiscard]] Result<void> determine(const PoseWithCovariance& message, const std::string& child);
+  /// @param frame  of the message
+  [[nodiscard]] Result<void> determine(Result<Measurement> value, const std::string& frame);
+  void count(const Result<void>& done);
 
   Node& node_;
   FramesIn& frames_;
   const ValueIn settings_;
   std::uint64_t taken_ = 0;
   std::uint64_t failed_ = 0;
+  std::uint64_t placeless_ = 0;
   std::string logged_;
   cli::Worker worker_{100};  // last: it uses the other members
 };

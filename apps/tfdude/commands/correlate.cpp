@@ -47,7 +47,7 @@ struct Correlate final : FrameCommand {
       Twist column;
       for (std::size_t row = 0; row < kRows; ++row) {
         column[static_cast<Eigen::Index>(row)] =
-            std::strtod(sources[at + 1 + row].c_str(), nullptr);
+            to_number(sources[at + 1 + row]).value_or(0);  // they were checked
       }
       column.tail<3>() /= angles.per_radian;
       auto error = std::find_if(errors.begin(), errors.end(),

@@ -29,6 +29,8 @@ struct Export final : Question {
     if (!named) return report(named.error(), common);
     const auto frames = edges(source);
     if (!frames) return report_cause(source, frames.error(), common);
+    const int status = check_partitions(source, common, !frames->empty());
+    if (status != kDone) return status;
     const auto text = write_frames(*frames, *named);
     if (!text) return report(text.error(), common);
     auto written = nlohmann::json::array();

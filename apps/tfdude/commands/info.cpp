@@ -1,3 +1,7 @@
+#include <array>
+#include <optional>
+#include <string>
+
 #include "tfdude/base/id.hpp"
 #include "tfdude/recording/recording.hpp"
 
@@ -9,6 +13,47 @@
 namespace tfdude::cli {
 namespace {
 
+// What was found in transforms of ROS.
+struct Kind {
+  const char* key;
+  const char* meaning;
+  std::size_t TransformCounts::*count;
+  bool left_out = true;
+};
+
+constexpr std::array<Kind, 10> kKinds{{
+    {"messages", "messages that cannot be read", &TransformCounts::messages},
+    {"names", "a name that cannot be an id", &TransformCounts::names},
+    {"values", "not a rigid transform, or a frame in itself", &TransformCounts::values},
+    {"cycles", "the parent is below the frame", &TransformCounts::cycles},
+    {"repeated", "another value for a stamp that was there before", &TransformCounts::repeated},
+    {"old", "older than the stamps that are remembered", &TransformCounts::old},
+    {"early", "a negative stamp", &TransformCounts::early},
+    {"same", "repeats of a sample", &TransformCounts::same, false},
+    {"unstamped", "a stamp of 0; taken as of the time when they were logged",
+     &TransformCounts::unstamped, false},
+    {"jumps", "the time of an edge jumped back; its samples before were dropped",
+     &TransformCounts::jumps, false},
+}};
+
+nlohmann::json json_of(const std::optional<TransformCounts>& counts) {
+  if (!counts) return nullptr;
+  nlohmann::json json = nlohmann::json::object();
+  for (const Kind& kind : kKinds) json[kind.key] = (*counts).*kind.count;
+  return json;
+}
+
+std::string describe(const TransformCounts& counts) {
+  std::string text;
+  for (const Kind& kind : kKinds) {
+    const std::size_t count = counts.*kind.count;
+    if (count == 0) continue;
+    text += (kind.left_out ? "left out     " : "found        ") + std::to_string(count) + " " +
+            kind.key + ": " + kind.meaning + "\n";
+  }
+  return text;
+}
+
 nlohmann::json json_of(const Recording& recording, const std::string& file) {
   const RecordingSummary summary = recording.summary();
   nlohmann::json json{{"file", file},
@@ -18,6 +63,7 @@ nlohmann::json json_of(const Recording& recording, const std::string& file) {
                       {"finished", summary.finished},
                       {"chunks", summary.chunks},
                       {"left_out", summary.left_out.value_or(0)},
+                      {"transforms", json_of(summary.transforms)},
                       {"problems", summary.problems},
                       {"messages", or_null(summary.messages)},
                       {"start_ns", nullptr},
@@ -61,9 +107,7 @@ std::string describe(const Recording& recording) {
     if (joints && !joints->empty()) text += ", " + std::to_string(joints->size()) + " joints";
     text += partition.reachable ? "\n" : ", not reachable at the end\n";
   }
-  if (summary.left_out.value_or(0) > 0) {
-    text += "left out     " + std::to_string(*summary.left_out) + " invalid transforms\n";
-  }
+  if (summary.transforms) text += describe(*summary.transforms);
   for (const std::string& problem : summary.problems) {
     text += "problem      " + printable(problem) + "\n";
   }

@@ -20,19 +20,33 @@ std::string position_text(const JointInfo& joint, double position, const AngleUn
 
 namespace {
 
+Result<JointValue> typed_joint(const std::string& word, const std::string& name,
+                               const std::string& number) {
+  if (const auto position = to_number(number)) return JointValue{name, *position};
+  std::string why = quote(word) + " is not NAME=POSITION";
+  if (!number.empty()) why += ": joint " + quote(name) + ": " + quote(number) + " is not a number";
+  return fail(Errc::kInvalidInput, why);
+}
+
 // A name may contain '=', a position cannot. The unit is that of the command line.
 Result<std::vector<JointValue>> typed_joints(const std::vector<std::string>& words) {
-  if (words.size() == 2 && is_number(words[1])) {
-    return std::vector<JointValue>{{words[0], std::strtod(words[1].c_str(), nullptr)}};
+  const auto has_equals = [](const std::string& word) {
+    return word.find('=') != std::string::npos;
+  };
+  const bool is_pair =
+      words.size() == 2 && !has_equals(words[1]) && (is_number(words[1]) || !has_equals(words[0]));
+  if (is_pair) {
+    return typed_joint(words[0], words[0], words[1]).map([](JointValue one) {
+      return std::vector<JointValue>{std::move(one)};
+    });
   }
   std::vector<JointValue> typed;
   for (const std::string& word : words) {
     const std::size_t equals = word.rfind('=');
-    const std::string number = equals == std::string::npos ? "" : word.substr(equals + 1);
-    if (!is_number(number)) {
-      return fail(Errc::kInvalidInput, quote(word) + " is not NAME=POSITION");
-    }
-    typed.push_back({word.substr(0, equals), std::strtod(number.c_str(), nullptr)});
+    auto one = typed_joint(word, word.substr(0, equals),
+                           equals == std::string::npos ? "" : word.substr(equals + 1));
+    if (!one) return tl::unexpected(std::move(one.error()));
+    typed.push_back(*std::move(one));
   }
   if (typed.empty()) return fail(Errc::kInvalidInput, "no joint is given: NAME=POSITION");
   return typed;

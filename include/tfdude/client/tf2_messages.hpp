@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <stdexcept>
@@ -12,6 +13,7 @@
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/conversions.hpp"
 #include "tfdude/math/perturbation.hpp"
+#include "tfdude/math/ros_variances.hpp"
 
 // tf2's exceptions, times and conversions for tfdude/tf2.hpp. Messages are the caller's: whatever
 // has the members of the messages of ROS 1 or ROS 2.
@@ -263,7 +265,8 @@ template <class Message>
 
 /// Brings a message to the frame of a transform. `out` may be `in`. Messages with a header get that
 /// of the transform; a pose without one is only moved. Covariance of a pose is turned, as in tf2,
-/// and that of the transform is added if it is known.
+/// and that of the transform is added if it is known. Variances that are no numbers mean what they
+/// mean to the bridge (docs/ros.md).
 template <class Message, class Transform>
 void doTransform(const Message& in, Message& out, const Transform& transform) {
   using namespace detail;
@@ -271,20 +274,20 @@ void doTransform(const Message& in, Message& out, const Transform& transform) {
                                     vector_of(transform.transform.translation));
   if (&out != &in) out = in;
   if constexpr (Has<Message, BelievedPose>::value) {
-    Eigen::Matrix<double, 6, 6, Eigen::RowMajor> sigma;
-    std::copy_n(in.pose.covariance.begin(), 36, sigma.data());
-    tfdude::Transform X_AC{X_AB * detail::pose_of(in.pose.pose), {}};
-    // Zeros say that nothing is known.
-    if (!sigma.isZero(0)) {
-      const auto own = Covariance::from_matrix(sigma);
-      if (!own) throw InvalidArgumentException(own.error().message);
+    std::array<double, 36> numbers{};
+    std::copy_n(in.pose.covariance.begin(), numbers.size(), numbers.begin());
+    const auto X_BC = ros::with_ros_covariance(detail::pose_of(in.pose.pose), {}, numbers);
+    if (!X_BC) throw InvalidArgumentException(X_BC.error().message);
+    tfdude::Transform X_AC{X_AB * X_BC->pose, {}};
+    // Numbers that say that it is not specified stay.
+    if (X_BC->covariance.complete()) {
       tfdude::Transform X{X_AB, StatedCovariance::exact()};
       if constexpr (std::is_same_v<Transform, TransformStamped>) {
         if (transform.covariance.complete()) X.covariance = transform.covariance;
       }
-      X_AC = compose(X, from_ros_covariance(detail::pose_of(in.pose.pose), *own));
-      sigma = ros_covariance(X_AC).of_specified().matrix();
-      std::copy_n(sigma.data(), 36, out.pose.covariance.begin());
+      X_AC = compose(X, *X_BC);
+      const Matrix6d sigma = ros_covariance(X_AC).of_specified().matrix();  // symmetric
+      std::copy_n(sigma.data(), numbers.size(), out.pose.covariance.begin());
     }
     set_pose(out.pose.pose, X_AC.pose);
   } else if constexpr (Has<Message, PoseMember>::value) {

@@ -20,7 +20,7 @@ enum class FrameFormat : std::uint8_t {
   kEyeOnHand,  ///< easy_handeye and easy_handeye2, a camera on the robot's hand
   kEyeOnBase,  ///< the same, a camera beside the robot
   kRos1,       ///< static_transform_publisher in a launch file of ROS 1
-  kRos2,       ///< the same in a launch file of ROS 2, in XML or Python
+  kRos2,       ///< the same in a launch file of ROS 2, in XML, Python or YAML
   kOpenCv,     ///< R and T of OpenCV's stereoCalibrate()
   kColmap,     ///< images.txt of COLMAP
   kG2o,        ///< a pose graph of g2o

@@ -11,6 +11,7 @@
 #include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/base/time.hpp"
+#include "tfdude/recording/transform_counts.hpp"
 #include "tfdude/types/change.hpp"
 #include "tfdude/types/edge.hpp"
 #include "tfdude/types/frame.hpp"
@@ -34,8 +35,10 @@ struct RecordingSummary {
   std::optional<std::uint64_t> messages;  ///< absent: not known without reading the file
   /// What is wrong with the file, as far as it was read; sentences for people.
   std::vector<std::string> problems;
-  /// Invalid transforms of ROS that were left out; absent: the whole file was not read for it.
+  /// Transforms of ROS that were left out; absent: the whole file was not read for it.
   std::optional<std::size_t> left_out{};
+  /// The same by kind, and what else was found in them.
+  std::optional<TransformCounts> transforms{};
 };
 
 /// A recorded change of frames or values, and when it was recorded.

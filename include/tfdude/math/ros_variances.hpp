@@ -3,12 +3,12 @@
 #include <array>
 #include <optional>
 
+#include "tfdude/base/export.hpp"
 #include "tfdude/base/result.hpp"
 #include "tfdude/math/pose.hpp"
 #include "tfdude/math/transform.hpp"
 
-// What the numbers of ROS's covariances mean: some of them are none. No DDS, no threads and no
-// clock.
+// What the numbers of ROS's covariances mean: some of them are none.
 namespace tfdude::ros {
 
 /// Standard deviations that are said where the messages have zeros: three [m], three [rad], along
@@ -20,7 +20,8 @@ struct StddevModel {
 };
 
 /// Of the child in the frame that sees it. A surface that is seen from the front has angle 0.
-[[nodiscard]] std::array<double, 6> stddev_at(const StddevModel& model, const Pose& X);
+[[nodiscard]] TFDUDE_EXPORT std::array<double, 6> stddev_at(const StddevModel& model,
+                                                            const Pose& X);
 
 /// How to read the covariances of a topic.
 struct Variances {
@@ -42,7 +43,7 @@ inline constexpr double kNoAngle = 1e2;     ///< [rad²]
 /// Matrices that are singular, or rounded to float32, are taken.
 /// @param numbers  6x6, row by row, about axes parallel to the message's frame
 /// @return kInvalidInput naming the element: no covariance.
-[[nodiscard]] Result<Transform> with_ros_covariance(const Pose& X, const Variances& variances,
-                                                    const std::array<double, 36>& numbers);
+[[nodiscard]] TFDUDE_EXPORT Result<Transform> with_ros_covariance(
+    const Pose& X, const Variances& variances, const std::array<double, 36>& numbers);
 
 }  // namespace tfdude::ros

@@ -1,4 +1,4 @@
-#include "variances.hpp"
+#include "tfdude/math/ros_variances.hpp"
 
 #include <algorithm>
 #include <cmath>

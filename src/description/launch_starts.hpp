@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+
+// What the readers of launch files share.
+namespace tfdude {
+
+inline constexpr const char* kStaticPublisher = "static_transform_publisher";
+
+/// One start of the program.
+struct LaunchStart {
+  std::vector<std::string> words;  ///< its arguments
+  bool of_tf = false;              ///< of the package tf, whose last argument is a period
+  int line = 0;
+};
+
+/// The words of arguments that may have several lines.
+[[nodiscard]] std::vector<std::string> launch_words(std::string_view text);
+
+/// Whether a condition holds. @param what  that depends on it, for the message
+/// @return kInvalidInput naming file and line: only the launch system could tell
+[[nodiscard]] Result<bool> launch_condition(std::string_view said, const std::string& what,
+                                            const std::string& file, int line);
+
+/// The starts in a launch file of ROS 2 in YAML, in the order of the file.
+/// @return kConfig naming file and line: not YAML, no launch file; as launch_condition()
+[[nodiscard]] Result<std::vector<LaunchStart>> starts_in_yaml(const std::string& text,
+                                                              const std::string& name);
+
+}  // namespace tfdude

@@ -1,0 +1,118 @@
+#include "recording/foreign_transforms.hpp"
+
+#include <algorithm>
+
+#include "tfdude/base/id.hpp"
+
+namespace tfdude::recording {
+namespace {
+
+// Samples that go back by more are from a clock that has jumped back, as in the bridge.
+constexpr std::chrono::seconds kJump{1};
+
+constexpr std::size_t kMostStamps = 2'000'000;
+constexpr std::size_t kLeastOfOneEdge = 64;
+constexpr std::size_t kMostOfOneEdge = 4096;
+
+std::size_t hash_of(const Pose& X) {
+  const Eigen::Quaterniond& q = X.rotation();
+  const Eigen::Vector3d& p = X.translation();
+  std::size_t hash = 0;
+  for (const double number : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) {
+    constexpr std::size_t kGolden = 0x9E3779B97F4A7C15ULL;
+    hash ^= std::hash<double>()(number) + kGolden + (hash << 6U) + (hash >> 2U);
+  }
+  return hash;
+}
+
+}  // namespace
+
+void ForeignTransforms::take(std::vector<RecordedValue>& values, TransformCounts& counts,
+                             const Report& report) {
+  std::vector<RecordedValue> taken;
+  for (RecordedValue& value : values) {
+    if (takes(value, counts, report)) taken.push_back(std::move(value));
+  }
+  values = std::move(taken);
+}
+
+bool ForeignTransforms::takes(RecordedValue& value, TransformCounts& counts, const Report& report) {
+  const std::string& id = value.edge.id;
+  const auto known = edges_.find(id);
+  const bool moves = known == edges_.end() || known->second.parent != value.edge.parent;
+  if (moves && is_below(value.edge.parent, id)) {
+    ++counts.cycles;
+    report("the transform of frame " + quote(id) + " is left out: its parent " +
+           quote(value.edge.parent) + " is below it");
+    return false;
+  }
+  Edge& edge = edges_[id];
+  if (moves) edge = Edge{value.edge.parent};
+  if (value.value.stamp) return takes_sample(value, edge, counts, report);
+  // From now on it is static, without the samples from before.
+  if (!edge.is_static) value.value.begins = Covariance();
+  edge = Edge{value.edge.parent};
+  return true;
+}
+
+bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, TransformCounts& counts,
+                                     const Report& report) {
+  const auto who = [&] { return "frame " + quote(value.edge.id); };
+  Time& stamp = *value.value.stamp;
+  const Time newest = edge.seen.empty() ? stamp : edge.seen.back().stamp;
+  if (newest - stamp > kJump) {
+    ++counts.jumps;
+    report(who() + ": time has jumped back by more than a second: its samples before are dropped");
+    edge = Edge{edge.parent};
+    value.value.begins = Covariance();
+  } else if (value.dated) {
+    stamp = std::max(stamp, newest);  // while the clock stands still, the last one counts
+  }
+  edge.is_static = false;
+  const Seen seen{stamp, hash_of(value.value.X_PC.pose)};
+  const auto place =
+      std::lower_bound(edge.seen.begin(), edge.seen.end(), stamp,
+                       [](const Seen& one, Time other) { return one.stamp < other; });
+  if (place != edge.seen.end() && place->stamp == stamp) {
+    const bool is_same = place->pose == seen.pose;
+    if (is_same && !value.dated) ++counts.same;
+    if (is_same || value.dated) {
+      place->pose = seen.pose;
+      return !is_same;
+    }
+    ++counts.repeated;
+    report("a transform of " + who() +
+           " is left out: another value for a stamp that was there before");
+    return false;
+  }
+  if (edge.forgotten && stamp <= *edge.forgotten) {
+    ++counts.old;
+    report("a transform of " + who() + " is left out: older than the " +
+           std::to_string(edge.seen.size()) + " newest samples");
+    return false;
+  }
+  edge.seen.insert(place, seen);
+  forget_some(edge);
+  return true;
+}
+
+// What is older by more than a jump is never asked for.
+void ForeignTransforms::forget_some(Edge& edge) const {
+  const std::size_t most = std::clamp(kMostStamps / edges_.size(), kLeastOfOneEdge, kMostOfOneEdge);
+  while (edge.seen.back().stamp - edge.seen.front().stamp > kJump) edge.seen.pop_front();
+  while (edge.seen.size() > most) {
+    edge.forgotten = edge.seen.front().stamp;
+    edge.seen.pop_front();
+  }
+}
+
+bool ForeignTransforms::is_below(std::string frame, const std::string& top) const {
+  while (frame != top) {
+    const auto edge = edges_.find(frame);
+    if (edge == edges_.end()) return false;
+    frame = edge->second.parent;
+  }
+  return true;
+}
+
+}  // namespace tfdude::recording
