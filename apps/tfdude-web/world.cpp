@@ -97,7 +97,13 @@ void World::take(Shown& partition, const ValuesNews& news) {
 }
 
 void World::keep(ShownFrame& frame, const WatchedValue& value) {
-  if (value.begins) frame.past.clear();
+  if (value.begins) {
+    const auto kept = [&](const ShownFrame::Sample& sample) {
+      return value.kept_before && sample.stamp < *value.kept_before;
+    };
+    frame.past.erase(std::partition_point(frame.past.begin(), frame.past.end(), kept),
+                     frame.past.end());
+  }
   const StatedCovariance sigma = whole(value);
   auto shared = frame.covariance && *frame.covariance == sigma
                     ? frame.covariance

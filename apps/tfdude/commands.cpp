@@ -12,7 +12,8 @@ AddCommand add_add, add_children, add_correlate, add_description, add_doctor, ad
     add_exists, add_export, add_forget, add_frames, add_fuse, add_graph, add_history, add_import,
     add_info, add_joint, add_joints, add_keys, add_lookup, add_monitor, add_move, add_observe,
     add_parent, add_partitions, add_plot, add_point, add_publish, add_record, add_remove,
-    add_replay, add_roots, add_tree, add_update, add_velocity, add_watch, add_web, add_why;
+    add_replay, add_rewrite, add_roots, add_tree, add_update, add_velocity, add_watch, add_web,
+    add_why;
 
 Commands::Commands(CLI::App& app) : app_(app) {
   const std::pair<const char*, std::vector<AddCommand*>> groups[] = {
@@ -21,7 +22,7 @@ Commands::Commands(CLI::App& app) : app_(app) {
         add_roots, add_parent, add_children, add_exists, add_joints, add_description}},
       {"Change",
        {add_add, add_update, add_move, add_remove, add_forget, add_observe, add_fuse, add_correlate,
-        add_joint, add_publish, add_import}},
+        add_joint, add_publish, add_rewrite, add_import}},
       {"Watch", {add_watch, add_echo, add_events, add_web}},
       {"Record", {add_record, add_info, add_replay, add_export}},
       {"Draw", {add_plot, add_graph}},

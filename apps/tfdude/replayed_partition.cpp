@@ -163,9 +163,32 @@ void ReplayedPartition::clear(const std::string& id, const WatchedValue& value, 
   (void)node_.clear_history(id);
 }
 
+// The samples of the edge from this value on, which is the first of a rewritten past. Those that a
+// replay does not keep are left out.
+void ReplayedPartition::rewrite(const std::string& id, const ValuesNews& values,
+                                std::size_t first) {
+  const WatchedValue& begin = values.values[first];
+  std::vector<EdgeSample> samples;
+  for (std::size_t i = first; i < values.values.size(); ++i) {
+    const WatchedValue& value = values.values[i];
+    if (value.frame == begin.frame && value.stamp) samples.push_back({*value.stamp, value.X_PC});
+  }
+  const EdgeTiming kept;  // the default
+  const Time oldest = samples.back().stamp - kept.span;
+  const auto from = std::find_if(samples.begin(), samples.end(),
+                                 [&](const EdgeSample& sample) { return sample.stamp >= oldest; });
+  const auto most = static_cast<std::ptrdiff_t>(kept.count);
+  samples.erase(samples.begin(),
+                std::max(from, samples.end() - std::min(most, samples.end() - from)));
+  if (!node_.rewrite(id, {*begin.kept_before, Time::max()}, samples)) rejected_ += samples.size();
+}
+
 Result<void> ReplayedPartition::apply(const ValuesNews& values) {
   settle(values);
-  for (const WatchedValue& value : values.values) {
+  std::set<std::uint32_t> rewritten;  // frames
+  for (std::size_t i = 0; i < values.values.size(); ++i) {
+    const WatchedValue& value = values.values[i];
+    if (rewritten.count(value.frame) > 0) continue;
     if (value.frame >= frames_.size()) continue;
     const WatchedFrame& frame = frames_[value.frame];
     const auto served = served_.find(frame.id);
@@ -187,6 +210,11 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
     // The value that the edge was opened with is that of no instant, either; later it has none.
     if (value.unsampled) {
       if (edge.dynamic) clear(frame.id, value, edge);
+      continue;
+    }
+    if (value.kept_before && value.stamp && edge.dynamic) {
+      rewrite(frame.id, values, i);
+      rewritten.insert(value.frame);
       continue;
     }
     if (value.begins) begin(frame, value, edge);

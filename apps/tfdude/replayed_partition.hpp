@@ -47,6 +47,7 @@ class ReplayedPartition {
   void settle(const ValuesNews& values);
   [[nodiscard]] bool place(const WatchedFrame& frame, const WatchedValue* value);
   void begin(const WatchedFrame& frame, const WatchedValue& value, Edge& edge);
+  void rewrite(const std::string& id, const ValuesNews& values, std::size_t first);
   void clear(const std::string& id, const WatchedValue& value, Edge& edge);
   [[nodiscard]] Result<void> flush();
 

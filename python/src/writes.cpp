@@ -6,6 +6,7 @@
 #include "batches.hpp"
 #include "bind.hpp"
 #include "client.hpp"
+#include "many.hpp"
 #include "waiting.hpp"
 
 // Values of many edges or joints: in one call, and by streams that are opened once.
@@ -157,6 +158,40 @@ void bind_many(ClientClass& cls) {
       py::arg("stamp") = py::none(), "As update_many(), without acknowledgement.");
 }
 
+/// The interval of a rewrite: (first, last), or that of the samples.
+TimeInterval interval_of(py::handle interval, const std::vector<Time>& stamps) {
+  if (interval.is_none()) return {stamps.front(), stamps.back()};
+  const bool pair = py::isinstance<py::sequence>(interval) && py::len(interval) == 2;
+  if (!pair) throw py::type_error("interval must be None, or its first and last instant");
+  const auto ends = py::reinterpret_borrow<py::sequence>(interval);
+  return {to_time(ends[0], "interval[0]"), to_time(ends[1], "interval[1]")};
+}
+
+void bind_rewrite(ClientClass& cls) {
+  cls.def(
+      "rewrite",
+      [](const Session& session, const std::string& id, py::handle stamps, py::handle poses,
+         py::handle covariances, py::handle interval) {
+        const std::vector<Time> times = to_instants(stamps);
+        if (times.empty()) throw py::value_error("stamps must have at least one instant");
+        const std::vector<Transform> X = to_transforms(poses, covariances, times.size());
+        std::vector<EdgeSample> samples(times.size());
+        for (std::size_t i = 0; i < times.size(); ++i) samples[i] = {times[i], X[i]};
+        const TimeInterval within = interval_of(interval, times);
+        check(session.call([&](Client& c) { return c.rewrite(id, within, samples); }));
+      },
+      py::arg("id"), py::arg("stamps"), py::arg("poses"), py::arg("covariances") = py::none(),
+      py::arg("interval") = py::none(),
+      "Replaces the samples of a dynamic edge within an interval, as SLAM does after a loop was\n"
+      "closed: one commit of its owner. Lookups, watches and recordings have the history before "
+      "it,\n"
+      "or the one after it.\n\n"
+      "stamps: (N,), in ascending order: int64 [ns], float64 [s], datetime64, or a sequence.\n"
+      "poses: (N, 7), each translation and quaternion (x, y, z, w); or N Transforms.\n"
+      "covariances: None, 'exact', one (6, 6) for all, or (N, 6, 6).\n"
+      "interval: its first and last instant; None: those of the stamps.");
+}
+
 void bind_joints(ClientClass& cls) {
   cls.def(
       "publish_joints",
@@ -204,6 +239,7 @@ void bind_joints(ClientClass& cls) {
 
 void bind_values_of_many(py::module_& module, ClientClass& cls) {
   bind_many(cls);
+  bind_rewrite(cls);
   bind_joints(cls);
   bind_streams(module, cls);
 }

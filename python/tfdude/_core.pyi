@@ -592,6 +592,14 @@ class Client:
     def publish(
         self, ids: Sequence[str], poses: _Poses, covariances: _Covariance = None, stamp: _Instant | None = None
     ) -> None: ...
+    def rewrite(
+        self,
+        id: str,
+        stamps: npt.ArrayLike | Iterable[_Instant],
+        poses: _Poses,
+        covariances: _Covariance = None,
+        interval: tuple[_Instant, _Instant] | None = None,
+    ) -> None: ...
     def publish_joints(
         self,
         names: Sequence[str],

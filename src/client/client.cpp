@@ -125,6 +125,11 @@ Result<void> Client::update_partial(const std::vector<PartialUpdate>& edges,
   return participant_->writes().update_partial(edges, stamp);
 }
 
+Result<void> Client::rewrite(const std::string& id, const TimeInterval& interval,
+                             const std::vector<EdgeSample>& samples) {
+  return participant_->writes().rewrite(id, interval, samples);
+}
+
 Result<void> Client::publish(const std::vector<EdgeUpdate>& edges, std::optional<Time> stamp) {
   return participant_->writes().publish(edges, stamp);
 }

@@ -91,6 +91,19 @@ struct ReviseRequest {
   std::uint64_t incarnation = 0;  ///< SegmentValues::incarnation of that commit
 };
 
+/// Some of the samples that are to replace those of the edge named by the request's id within an
+/// interval. Once all have come, in any order, the owner replaces them in one commit.
+struct RewriteRequest {
+  std::uint64_t number = 0;  ///< of the rewrite, among those of its sender
+  TimeInterval interval;
+  std::uint32_t total = 0;          ///< the number of all samples
+  std::uint32_t first = 0;          ///< how many are before those here
+  std::vector<EdgeSample> samples;  ///< at least one, at most kMostRewrittenAtOnce
+};
+
+/// With their covariances they fit a datagram.
+inline constexpr std::uint32_t kMostRewrittenAtOnce = 256;
+
 /// Sets how the error of the edge named by the request's id is correlated with others.
 struct CorrelateRequest {
   Correlation correlation;
@@ -190,7 +203,7 @@ struct Request {
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
-               DescriptionRequest, MemoryRequest, TimeRequest>
+               DescriptionRequest, MemoryRequest, TimeRequest, RewriteRequest>
       body;
   /// The sender awaits no replies of this partition to requests with lower numbers, in whatever
   /// order they come. Not greater than the full number of this request, of which `sequence` has the

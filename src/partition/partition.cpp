@@ -99,7 +99,7 @@ void Partition::detach_joint(const std::string& id) {
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
   if (is_read_only(request)) return answer(request, now);
   if (auto before = replies_.find(peer, request, now)) return *std::move(before);
-  Reply reply = answer(request, now);
+  Reply reply = answer_new(peer, request, now);
   replies_.put(peer, request, reply);
   return reply;
 }
@@ -113,6 +113,11 @@ Reply Partition::refuse(const PeerId& peer, const Request& request, const Error&
 }
 
 Reply Partition::answer(const Request& request, Time now) {
+  return answer_new(PeerId(), request, now);
+}
+
+Reply Partition::answer_new(const PeerId& peer, const Request& request, Time now) {
+  rewrites_.forget_idle(now);
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return answer_lookup(request.sequence, *lookup);
   }
@@ -126,7 +131,7 @@ Reply Partition::answer(const Request& request, Time now) {
     reply.body = joints_.infos(std::get<JointsRequest>(request.body).after);
     return reply;
   }
-  if (auto done = apply(request, now); !done) reply.body = std::move(done.error());
+  if (auto done = apply(peer, request, now); !done) reply.body = std::move(done.error());
   reply.epoch = pages_.shown_epoch();
   reply.lamport_time = directory_.latest_lamport_time();
   return reply;
@@ -175,20 +180,21 @@ Reply Partition::answer_history(const Request& request) const {
   return {request.sequence, 0, forest_.histories(all ? std::string_view() : request.id)};
 }
 
-Result<void> Partition::apply(const Request& request, Time now) {
-  return std::visit(Overloaded{[&](const AddRequest& one) { return add(request.id, one, now); },
-                               [&](const RemoveRequest& one) { return remove(one, now); },
-                               [&](const UpdateRequest& one) { return update(one); },
-                               [&](const PartialUpdateRequest& one) { return update(one); },
-                               [&](const MoveRequest& one) { return move(request.id, one, now); },
-                               [&](const ReviseRequest& one) { return revise(one); },
-                               [&](const JointUpdate& one) { return set_joints(one); },
-                               [&](const CorrelateRequest& one) {
-                                 return correlate(request.id, one.correlation);
-                               },
-                               [&](const ForgetRequest& one) { return forget_partition(one, now); },
-                               [](const auto&) -> Result<void> { return {}; }},
-                    request.body);
+Result<void> Partition::apply(const PeerId& peer, const Request& request, Time now) {
+  return std::visit(
+      Overloaded{
+          [&](const AddRequest& one) { return add(request.id, one, now); },
+          [&](const RemoveRequest& one) { return remove(one, now); },
+          [&](const UpdateRequest& one) { return update(one); },
+          [&](const PartialUpdateRequest& one) { return update(one); },
+          [&](const MoveRequest& one) { return move(request.id, one, now); },
+          [&](const ReviseRequest& one) { return revise(one); },
+          [&](const RewriteRequest& one) { return rewrite(peer, request.id, one, now); },
+          [&](const JointUpdate& one) { return set_joints(one); },
+          [&](const CorrelateRequest& one) { return correlate(request.id, one.correlation); },
+          [&](const ForgetRequest& one) { return forget_partition(one, now); },
+          [](const auto&) -> Result<void> { return {}; }},
+      request.body);
 }
 
 Result<void> Partition::add(const std::string& id, const AddRequest& request, Time now) {
@@ -313,6 +319,23 @@ Result<void> Partition::revise(const ReviseRequest& request) {
     so_far.sum.expected += edge.innovation.expected;
     so_far.sum.variance += edge.innovation.variance;
   }
+  return {};
+}
+
+// What is known to fail later fails with the first part, before anything is kept.
+Result<void> Partition::rewrite(const PeerId& peer, const std::string& id,
+                                const RewriteRequest& part, Time now) {
+  if (auto ok = forest_.check_rewrite(id, part.interval, part.total); !ok) {
+    rewrites_.forget(peer, part.number);
+    return tl::unexpected(at_home(std::move(ok.error()), id));
+  }
+  const auto all = rewrites_.add(peer, id, part, now);
+  if (!all) return tl::unexpected(all.error());
+  if (!*all) return {};
+  if (auto done = forest_.rewrite(id, part.interval, **all); !done) {
+    return tl::unexpected(at_home(std::move(done.error()), id));
+  }
+  values_asked_ = true;
   return {};
 }
 

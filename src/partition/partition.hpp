@@ -16,6 +16,7 @@
 #include "partition/messages.hpp"
 #include "partition/pages.hpp"
 #include "partition/reply_cache.hpp"
+#include "partition/rewrites.hpp"
 #include "partition/state_store.hpp"
 #include "tree/forest.hpp"
 
@@ -130,7 +131,8 @@ class Partition {
   }
 
  private:
-  [[nodiscard]] Result<void> apply(const Request& request, Time now);
+  [[nodiscard]] Reply answer_new(const PeerId& peer, const Request& request, Time now);
+  [[nodiscard]] Result<void> apply(const PeerId& peer, const Request& request, Time now);
   [[nodiscard]] Result<void> add(const std::string& id, const AddRequest& request, Time now);
   [[nodiscard]] Result<void> remove(const RemoveRequest& request, Time now);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request, Time now);
@@ -139,6 +141,8 @@ class Partition {
   template <class Edge>
   [[nodiscard]] Result<void> note_update(const std::vector<Edge>& edges, Result<void> updated);
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
+  [[nodiscard]] Result<void> rewrite(const PeerId& peer, const std::string& id,
+                                     const RewriteRequest& part, Time now);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time);
@@ -169,6 +173,7 @@ class Partition {
   Pages pages_;
   Joints joints_;
   ReplyCache replies_;
+  Rewrites rewrites_;
   std::size_t max_frames_ = SIZE_MAX;
   std::uint64_t refused_frames_ = 0;
   std::map<std::string, EdgeConsistency> consistency_;  // of observed edges

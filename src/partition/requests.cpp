@@ -28,7 +28,8 @@ bool is_of_structure(const Request& request) {
 }
 
 bool is_of_values(const Request& request) {
-  return is_one_of<UpdateRequest, PartialUpdateRequest, JointUpdate, ReviseRequest>(request);
+  return is_one_of<UpdateRequest, PartialUpdateRequest, JointUpdate, ReviseRequest, RewriteRequest>(
+      request);
 }
 
 std::string describe(const Request& request) {
@@ -58,6 +59,7 @@ std::string attempt_of(const Request& request) {
   if (std::holds_alternative<ReviseRequest>(request.body)) return "observe" + frame;
   if (std::holds_alternative<CorrelateRequest>(request.body)) return "correlate" + frame;
   if (std::holds_alternative<JointUpdate>(request.body)) return "move joints";
+  if (std::holds_alternative<RewriteRequest>(request.body)) return "rewrite" + frame;
   return "update" + frame;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -145,9 +146,11 @@ void WatchedGroup::begin(const PushedValues& told) {
   begun_ = {told.commit, newest.value_or(Time::min()), false};
 }
 
-Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from) const {
+Result<PushedValues> WatchedGroup::snapshot(const Forest& forest, std::optional<Time> from,
+                                            bool is_answer) const {
   auto values = all(forest, from);
   if (!values) return values;
+  leave_out_pending(*values, is_answer);
   for (PushedValue& value : values->entries) numbers_.label(value);
   return values;
 }
@@ -182,10 +185,38 @@ Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time>
   return pushed;
 }
 
+// The watchers have the history before one that a push is about to tell, perhaps as what goes on
+// from that. Whatever comes first would only tell them that theirs is over.
+void WatchedGroup::leave_out_pending(PushedValues& pushed, bool on_its_way) const {
+  if (request_.period > std::chrono::nanoseconds(0)) return;
+  auto& entries = pushed.entries;
+  const auto pending =
+      std::remove_if(entries.begin(), entries.end(), [&](const PushedValue& entry) {
+        if (request_.composed) return false;
+        const std::uint64_t history = cursors_[entry.index].history;
+        const bool is_rewritten =
+            std::find(rewritten_.begin(), rewritten_.end(), entry.index) != rewritten_.end();
+        return (on_its_way && is_rewritten) || (history != 0 && history != entry.history);
+      });
+  if (pending == entries.end()) return;
+  entries.erase(pending, entries.end());
+  pushed.commit = arrived_commit_;
+}
+
+void WatchedGroup::note_rewritten(const std::vector<PushedValue>& values) {
+  std::map<std::uint32_t, std::uint64_t> begun;  // histories by edge
+  for (const PushedValue& value : values) {
+    if (!value.process_noise) continue;
+    const auto [before, is_first] = begun.emplace(value.index, value.history);
+    if (!is_first && before->second < value.history) rewritten_.push_back(value.index);
+  }
+}
+
 PushedValues WatchedGroup::changed(const Forest& forest) {
   if (request_.composed) return next_composed_push(forest);
   const bool newest_only = request_.period > std::chrono::nanoseconds(0);
   auto found = forest.values_since(cursors_, {newest_only, {}, true, request_.of_samples});
+  note_rewritten(found.values);
   PushedValues pushed{id_, std::move(found.values), told_, found.commit};
   if (!pushed.entries.empty()) told_ = pushed.commit;
   return pushed;
@@ -318,6 +349,7 @@ std::optional<PushedValues> PushedPieces::add(const PushedValues& piece) {
 
 ReceivedGroup::Place ReceivedGroup::place(PushedValues& whole) {
   const bool knows_all = covariances_.fill_in(whole.entries);
+  join_histories(whole.entries);
   const Place place{whole.commit <= commit_, knows_all && whole.after <= commit_};
   skip(whole);
   if (place.follows_on) commit_ = std::max(commit_, whole.commit);

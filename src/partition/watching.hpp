@@ -69,7 +69,9 @@ class WatchedGroup {
   /// @return kNotOwner (naming the frame) if an edge is not held, or has another parent;
   ///   kInvalidInput for a composed segment that has process noise: its covariance would be too
   ///   small between samples.
-  [[nodiscard]] Result<PushedValues> snapshot(const Forest& forest, std::optional<Time> from) const;
+  /// @param is_answer  it may arrive before what was pushed already
+  [[nodiscard]] Result<PushedValues> snapshot(const Forest& forest, std::optional<Time> from,
+                                              bool is_answer = false) const;
 
   /// The first watcher was told this, a snapshot().
   void begin(const PushedValues& told);
@@ -79,11 +81,20 @@ class WatchedGroup {
   /// samples since begin(). Empty while an edge is not held, or has another parent: the watchers
   /// then use another route.
   [[nodiscard]] PushedValues next_push(const Forest& forest);
+  /// Whether a push has told of a past that was rewritten, which may not have arrived yet.
+  [[nodiscard]] bool has_rewritten() const { return !rewritten_.empty(); }
+  /// All pushes have arrived.
+  void arrived() {
+    rewritten_.clear();
+    arrived_commit_ = told_;
+  }
 
  private:
   [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
   [[nodiscard]] Result<PushedValues> composed(const Forest& forest, std::optional<Time> from) const;
   [[nodiscard]] Result<PushedValues> all(const Forest& forest, std::optional<Time> from) const;
+  void leave_out_pending(PushedValues& pushed, bool on_its_way) const;
+  void note_rewritten(const std::vector<PushedValue>& values);
   /// Whether nothing of its history was sent yet.
   [[nodiscard]] bool begins(const PushedValue& entry) const;
   [[nodiscard]] bool is_new(const PushedValue& entry) const;
@@ -92,7 +103,10 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::uint64_t told_ = 0;  // commit of the last push
+  std::uint64_t told_ = 0;            // commit of the last push
+  std::uint64_t arrived_commit_ = 0;  // of the last one that has arrived
+  // Edges whose past was rewritten, as a push says that has not.
+  std::vector<std::uint32_t> rewritten_;
   // What the first watcher was told of composed segments.
   SeenSegments begun_{0, Time::min(), true};
   std::vector<EdgeCursor> cursors_;               // by edge

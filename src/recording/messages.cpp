@@ -13,6 +13,7 @@ namespace {
 // The least bytes of an element of a sequence.
 constexpr std::size_t kLeastText = 4;
 constexpr std::size_t kLeastValue = 4 + 4 + 8 + 2 + 56 + 4 * 4;
+constexpr std::size_t kLeastKept = 4 + 8;
 constexpr std::size_t kLeastJoint = 4 + 4 + 2 + 8 + 4 + 4 + 4 + 32;
 
 tl::unexpected<Error> invalid(const char* what) {
@@ -106,6 +107,7 @@ ValuesEncoder::ValuesEncoder(std::string& out, std::string_view partition, std::
 }
 
 void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, bool as_before) {
+  if (value.begins && value.kept_before) kept_.emplace_back(count_, *value.kept_before);
   ++count_;
   writer_.text(edge.id);
   writer_.text(edge.parent);
@@ -130,6 +132,14 @@ void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, boo
     writer_.u32(0);
   }
   put(writer_, value.correlation);
+}
+
+void ValuesEncoder::put_kept() {
+  writer_.u32(static_cast<std::uint32_t>(kept_.size()));
+  for (const auto& [value, before] : kept_) {
+    writer_.u32(value);
+    writer_.i64(nanoseconds(before));
+  }
 }
 
 std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
@@ -182,11 +192,31 @@ Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
   const std::uint32_t count = reader.count(kLeastValue);
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("values");
   all.values.reserve(count);
+  std::vector<std::uint32_t> numbers;  // of the values that are valid
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (auto value = decode_value(reader)) all.values.push_back(*std::move(value));
+    if (auto value = decode_value(reader)) {
+      all.values.push_back(*std::move(value));
+      numbers.push_back(i);
+    }
     if (!reader.good()) return invalid("values");
   }
+  decode_kept(reader, numbers, all.values);
+  if (!reader.good()) return invalid("values");
   return all;
+}
+
+// Earlier versions did not write this.
+void ValuesDecoder::decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
+                                std::vector<RecordedValue>& values) {
+  if (reader.left() == 0) return;
+  for (std::uint32_t left = reader.count(kLeastKept); left > 0 && reader.good(); --left) {
+    const std::uint32_t number = reader.u32();
+    const std::int64_t before = reader.i64();
+    const auto found = std::lower_bound(numbers.begin(), numbers.end(), number);
+    if (found == numbers.end() || *found != number || before < 0 || before > kMaxTime) continue;
+    WatchedValue& value = values[static_cast<std::size_t>(found - numbers.begin())].value;
+    if (value.begins) value.kept_before = time_of(before);
+  }
 }
 
 void encode(const RecordedFrames& frames, std::string& out) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "tfdude/recording/transform_counts.hpp"
@@ -66,13 +67,17 @@ class ValuesEncoder {
   void add(const WatchedFrame& edge, const WatchedValue& value, bool as_before);
   void finish() {
     writer_.set(count_place_, count_);
+    put_kept();
     writer_.finish();
   }
 
  private:
+  void put_kept();
+
   CdrWriter writer_;
   std::size_t count_place_;
   std::uint32_t count_ = 0;
+  std::vector<std::pair<std::uint32_t, Time>> kept_;  // WatchedValue::kept_before, by value
 };
 
 /// Reads values, in the order of the file from a keyframe or the beginning on.
@@ -83,6 +88,8 @@ class ValuesDecoder {
 
  private:
   [[nodiscard]] std::optional<RecordedValue> decode_value(CdrReader& reader);
+  static void decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
+                          std::vector<RecordedValue>& values);
   std::unordered_map<std::string, Covariance> last_;  // by frame
 };
 

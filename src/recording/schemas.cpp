@@ -33,6 +33,13 @@ string partition
 uint64 commit
 bool repeats        # see Keyframe
 Value[] values
+Kept[] kept
+================================================================================
+MSG: tfdude_msgs/Kept
+# The past was rewritten: of the history before the one that begins with a value, the samples before
+# this instant still hold.
+uint32 value        # index among the values
+int64 before        # nanoseconds
 ================================================================================
 MSG: tfdude_msgs/Value
 # The value of the edge from a frame's parent to the frame.

@@ -146,6 +146,7 @@ void State::apply(const RecordedValues& recorded, bool foreign) {
     PushedValue value{static_cast<std::uint32_t>(edges.size()), one.value.stamp, one.value.X_PC,
                       one.value.correlation};
     value.process_noise = one.value.begins;
+    value.kept_before = one.value.kept_before;
     value.cleared = one.value.cleared;
     value.unsampled = one.value.unsampled;
     const bool first = valueless_.erase(one.edge.id) > 0;

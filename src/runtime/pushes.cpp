@@ -8,6 +8,12 @@
 #include "base/mutex.hpp"
 
 namespace tfdude {
+namespace {
+
+// How long a push of many values may take to arrive, if some of it must be repeated.
+constexpr Milliseconds kArrival{500};
+
+}  // namespace
 
 void Pushes::stop() {
   const Lock lock(mutex_);
@@ -70,7 +76,8 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
       edges_ += request.segments.size();
       if (watcher) ++watchers_[*watcher].groups;
     }
-    snapshot = known->second.watched.snapshot(forest_, request.from);
+    await_arrival(known->second);
+    snapshot = known->second.watched.snapshot(forest_, request.from, true);
     if (!snapshot) {
       end(known);
     } else {
@@ -81,6 +88,16 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
   }
   sink_.wake();
   return snapshot;
+}
+
+void Pushes::await_arrival(Group& group) {
+  const auto now = sink_.now();
+  if (!group.watched.has_rewritten() || (group.arrives && now >= *group.arrives)) {
+    group.watched.arrived();
+    group.arrives.reset();
+  } else if (!group.arrives) {
+    group.arrives = now + kArrival;
+  }
 }
 
 void Pushes::tell_all(std::uint64_t group) {
@@ -144,7 +161,11 @@ Pushes::Clock::time_point Pushes::run() {
   auto next = kNever;
   std::vector<std::uint64_t> ended;
   for (PushedValues& pushed : take_due(sink_.now(), ended, next)) {
+    const std::uint64_t group = pushed.group;
     for (const PushedValues& piece : pieces_of(std::move(pushed))) sink_.push(piece);
+    const Lock lock(mutex_);
+    const auto known = groups_.find(group);
+    if (known != groups_.end()) await_arrival(known->second);
   }
   for (const std::uint64_t group : ended) sink_.end(group);
   return next;

@@ -74,6 +74,7 @@ class Pushes {
     Clock::time_point due;
     bool all = false;  // must be sent completely once more
     std::optional<PeerId> begun_by{};
+    std::optional<Clock::time_point> arrives{};  // a push that tells of a rewritten past
   };
   struct Watcher {
     TokenBucket begins{kNewPerSecond, kNewAtOnce};
@@ -86,6 +87,7 @@ class Pushes {
       TFDUDE_REQUIRES(mutex_);
   void forget_idle_watchers(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
 
+  void await_arrival(Group& group) TFDUDE_REQUIRES(mutex_);
   void end(std::map<std::uint64_t, Group>::iterator& group) TFDUDE_REQUIRES(mutex_);
   /// The values to send now.
   /// @param next  gets the time when there may be more without another commit

@@ -139,6 +139,7 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   // commit.
   if (!follows_on && !entry.stamp && !entry.cleared) return std::nullopt;
   if (!begins) entry.process_noise.reset();
+  if (!begins || entry.continues != edge.history) entry.kept_before.reset();
   // The stamps of another history say nothing about this one: a source's clock may jump back.
   if (begins || entry.cleared) {
     edge.newest.reset();

@@ -226,6 +226,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   Known& known = known_[frame];
   const bool begins = entry.history > known.history;
   if (entry.history < known.history || (begins && !entry.process_noise)) return;
+  const bool goes_on = begins && entry.continues == known.history;
   // Another group, or a reply, has told the edge's value as of a later commit.
   const bool is_old = !begins && message.commit <= known.commit;
   if (is_old) entry.correlation = known.correlation;
@@ -252,7 +253,9 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
                     {},
                     entry.cleared,
                     entry.unsampled});
-  if (begins) values.back().begins = entry.process_noise;
+  if (!begins) return;
+  values.back().begins = entry.process_noise;
+  if (goes_on) values.back().kept_before = entry.kept_before;
 }
 
 bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {

@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "calls/rewrite_task.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -95,6 +97,14 @@ Result<void> Writes::publish(const std::vector<EdgeUpdate>& edges, std::optional
   return requests_.publish(*parts, deadline, share_of, [this](const Update& own) {
     return structure_.forest.update(own.edges, own.stamp);
   });
+}
+
+Result<void> Writes::rewrite(const std::string& id, const TimeInterval& interval,
+                             const std::vector<EdgeSample>& samples) {
+  auto rewritten = structure_.forest.rewrite(id, interval, samples);
+  if (rewritten || !is_elsewhere(rewritten.error())) return rewritten;
+  RewriteTask task(structure_.forest, id, rewrites_.fetch_add(1), interval, samples);
+  return requests_.run(task, discovery_.call_deadline());
 }
 
 Result<void> Writes::correlate(const std::string& id, const Correlation& correlation) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +33,8 @@ class Writes {
                                             std::optional<Time> stamp);
   [[nodiscard]] Result<void> publish(const std::vector<EdgeUpdate>& edges,
                                      std::optional<Time> stamp);
+  [[nodiscard]] Result<void> rewrite(const std::string& id, const TimeInterval& interval,
+                                     const std::vector<EdgeSample>& samples);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> forget(const std::string& partition);
 
@@ -50,6 +54,7 @@ class Writes {
   Discovery& discovery_;
   Requests& requests_;
   MemberRunner& member_;
+  std::atomic<std::uint64_t> rewrites_{0};  // begun
 };
 
 }  // namespace tfdude

@@ -16,6 +16,7 @@
 #include "tfdude/math/belief.hpp"
 #include "tfdude/math/transform.hpp"
 #include "tfdude/types/edge.hpp"
+#include "tfdude/types/edge_sample.hpp"
 #include "tfdude/types/query.hpp"
 
 #include "math/joint_state.hpp"
@@ -158,6 +159,20 @@ class Forest {
   /// @return as update(); kInvalidInput also for an invalid part (naming it).
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
                                             std::optional<Time> stamp = std::nullopt);
+
+  /// Replaces the samples of a dynamic edge within an interval by others, as one commit. What an
+  /// observation has found out about the replaced ones ends with them. Watchers get all samples
+  /// from the interval on again, as another history. O(samples from the interval on).
+  /// @param samples  at least one, all within the interval, each later than the one before
+  /// @return kUnknownFrame, kNotOwner, kTooOld (the first is older than the history that is kept),
+  ///   kTooMuch (more than the history keeps), kInvalidInput (naming the sample or what is wrong; a
+  ///   static edge, or one that drifts), kNotYet as update(). Nothing has changed then.
+  [[nodiscard]] Result<void> rewrite(std::string_view id, const TimeInterval& interval,
+                                     const std::vector<EdgeSample>& samples);
+  /// Whether so many samples may be rewritten; kInvalidInput, kTooMuch, kUnknownFrame and kNotOwner
+  /// as above.
+  [[nodiscard]] Result<void> check_rewrite(std::string_view id, const TimeInterval& interval,
+                                           std::size_t count) const;
 
   /// Sets the timing of an edge, and clears its history, except what resume() has restored. An edge
   /// that is declared dynamic then has no value at any instant until its first sample; lookups of

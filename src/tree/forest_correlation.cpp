@@ -139,6 +139,10 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
   }
   if (!stamp) return fail(Errc::kChangedMeanwhile, who + " became dynamic since it was observed");
+  // Samples from which the value was computed may be gone.
+  if (edge.history > seen) {
+    return fail(Errc::kChangedMeanwhile, who + " has another history since it was observed");
+  }
   const std::int64_t at = nanoseconds(*stamp);
   if (auto ok = check_ahead(edge, at); !ok) return ok;
   const std::uint64_t place = edge.samples->place_of(at);
@@ -253,9 +257,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
-  if (superseded->has_instants(place) || superseded->has_instants(place + 1)) {
-    fresh.history = fresh.commit;
-  }
+  if (superseded->has_instants(place) || superseded->has_instants(place + 1)) begin_again(fresh);
   reclaimer_.supersede(superseded);
 }
 

@@ -91,7 +91,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   HeldVersion& fresh = push_held(newest.slot, newest.X_PC);
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
-  if (newest.samples->has_instants(place)) fresh.history = fresh.commit;
+  if (newest.samples->has_instants(place)) begin_again(fresh);
   drop_samples(*samples, newest.stamp);
 }
 

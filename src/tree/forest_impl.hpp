@@ -109,6 +109,11 @@ class Forest::Impl {
     const HeldVersion& edge = frames_.newest_value(slot);
     edge.samples->set_made_up(edge.number);
   }
+  /// Makes the fresh version's history another one, of which watchers have nothing.
+  void begin_again(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_) {
+    fresh.history = fresh.commit;
+    fresh.samples->forget_earlier();
+  }
   /// Makes the fresh version static and clears its history, but keeps its timing.
   void forget_history(HeldVersion& fresh) TFDUDE_REQUIRES(mutex_);
   /// Pushes a version of a dynamic edge without any sample.
@@ -125,6 +130,25 @@ class Forest::Impl {
   /// they have in common.
   [[nodiscard]] Sample sample_at(const SampleHistory& samples, std::uint64_t place,
                                  const GivenValue& value, std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
+
+  // Rewriting (forest_rewrite.cpp).
+
+  /// A sample to be added.
+  struct TimedValue {
+    std::int64_t stamp = 0;
+    const Transform* X_PC = nullptr;
+    const SampleRevision* revision = nullptr;  ///< as of GivenValue
+  };
+  /// Whether so many samples may replace those of the edge within the interval.
+  [[nodiscard]] Result<void> check_rewrite(const HeldVersion& edge, const TimeInterval& interval,
+                                           std::size_t count) TFDUDE_REQUIRES(mutex_);
+  /// Pushes a version of a dynamic edge in which these samples, sorted and at least one, are those
+  /// of the time from the first to the second instant. O(samples from the first on).
+  void replace_samples(const HeldVersion& newest, std::int64_t from, std::int64_t to,
+                       const std::vector<TimedValue>& samples) TFDUDE_REQUIRES(mutex_);
+  /// The values of one edge from kept_before on, of which the first has it.
+  void rewrite_told(const HeldVersion& edge, const std::vector<const PushedValue*>& values)
       TFDUDE_REQUIRES(mutex_);
 
   // The limit of all histories (forest_limit.cpp).

@@ -7,19 +7,32 @@
 namespace tfdude {
 namespace {
 
-// What an observation has found about one sample, instead of what is said of its edge.
-bool is_of_sample(const PushedValue& value) {
-  const auto& common_errors = value.correlation.common_errors;
-  return value.stamp && std::any_of(common_errors.begin(), common_errors.end(), is_observed);
-}
-
 bool is_known(const Sample& sample, const PushedValue& told, const Correlation& correlation) {
   const SharedRevision* revision = sample.revision();
   return same(sample.value(), told.X) &&
          (revision != nullptr ? revision->correlation() : Correlation()) == correlation;
 }
 
+// Of the edge of the value at i, which begins a history: those that stay together.
+std::vector<const PushedValue*> samples_from(const std::vector<PushedValue>& values,
+                                             std::size_t i) {
+  std::vector<const PushedValue*> samples;
+  for (std::size_t j = i; j < values.size(); ++j) {
+    const PushedValue& one = values[j];
+    if (one.index != values[i].index) continue;
+    const bool plain = one.stamp && !one.cleared && !one.unsampled;
+    if (!plain || !check_common_errors(one.correlation.common_errors)) return {};
+    samples.push_back(&one);
+  }
+  return samples;
+}
+
 }  // namespace
+
+bool is_of_sample(const PushedValue& value) {
+  const auto& common_errors = value.correlation.common_errors;
+  return value.stamp && std::any_of(common_errors.begin(), common_errors.end(), is_observed);
+}
 
 // The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
@@ -98,10 +111,18 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
     return static_cast<const HeldVersion*>(edge);
   };
   bool changed = false;
-  for (const PushedValue& value : values) {
+  std::vector<bool> rewritten(edges.size(), false);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const PushedValue& value = values[i];
     const HeldVersion* edge = edge_of(value);
+    if (edge == nullptr || rewritten[value.index]) continue;
     if (!check_common_errors(value.correlation.common_errors)) continue;
-    if (edge != nullptr && impl_->push_told(*edge, value, replace)) changed = true;
+    if (value.kept_before && edge->moving()) {
+      const auto samples = samples_from(values, i);
+      rewritten[value.index] = !samples.empty();
+      if (!samples.empty()) impl_->rewrite_told(*edge, samples);
+    }
+    if (rewritten[value.index] || impl_->push_told(*edge, value, replace)) changed = true;
   }
   std::vector<bool> correlated(edges.size(), false);
   for (auto value = values.rbegin(); value != values.rend(); ++value) {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "tree/forest_impl.hpp"
 
@@ -206,17 +207,56 @@ void Telling::finish(bool begins) {
       edge_.samples != nullptr ? edge_.samples->timing().process_noise : Covariance();
 }
 
+// The instant up to which a watcher has this history already, as that before it; kAlways: it has
+// nothing of it. Late samples of that one may not have been told.
+std::int64_t kept_before(const HeldVersion& edge, const EdgeCursor& cursor) {
+  if (!edge.moving() || edge.lacks_sample()) return kAlways;
+  const SampleHistory& samples = *edge.samples;
+  const std::int64_t kept = samples.kept_before(cursor.history);
+  if (kept == kAlways) return kAlways;
+  for (std::uint64_t number = samples.oldest(); number <= edge.number; ++number) {
+    const Sample* sample = samples.sample(number);
+    if (sample == nullptr) continue;
+    if (sample->stamp >= kept) break;
+    if (sample->commit > cursor.commit) return sample->stamp;
+  }
+  return kept;
+}
+
+// What has changed of a history since a rewrite, as two histories (join_histories()).
+void add_rewritten(const HeldVersion& edge, std::uint32_t index, const PushedQuery& query,
+                   std::int64_t from, const EdgeCursor& cursor, std::vector<PushedValue>& values) {
+  const std::size_t place = values.size();
+  values.push_back({index, time_of(from), {}, {}, cursor.history, {}});
+  Telling telling(edge, index, query.of_samples, values);
+  std::uint64_t first = edge.number;
+  while (first > edge.samples->oldest() && edge.samples->stamp(first - 1) >= from) --first;
+  telling.tell_samples(first, 0);
+  telling.finish(true);
+  values[place].X = values[place + 1].X;
+  values[place].process_noise = values[place + 1].process_noise;
+}
+
 void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery& query,
                 std::uint64_t commit, EdgeCursor& cursor, std::vector<PushedValue>& values) {
   const bool begins = edge.history != cursor.history;
   const std::uint64_t seen = begins ? 0 : cursor.commit;
+  const bool goes_on = begins && !query.newest_only;
+  if (const std::int64_t kept = goes_on ? kept_before(edge, cursor) : kAlways; kept != kAlways) {
+    add_rewritten(edge, index, query, kept, cursor, values);
+    cursor.commit = commit;
+    cursor.history = edge.history;
+    return;
+  }
   Telling telling(edge, index, query.of_samples, values);
   if (edge.lacks_sample()) {
     telling.tell_no_sample(seen);
   } else if (edge.moving() && query.newest_only) {
     telling.tell_newest(seen);
   } else if (edge.moving()) {
-    const std::uint64_t told = cursor.history == 0 ? cursor.commit : seen;
+    // What was told before the first push, unless it was of another history.
+    const bool is_told = cursor.history == 0 && edge.history <= cursor.commit;
+    const std::uint64_t told = is_told ? cursor.commit : seen;
     telling.tell_samples(first_to_tell(edge, cursor, told, query), told);
     if (begins) telling.tell_newest_if_none();
   } else if (edge.commit > seen) {
@@ -228,6 +268,26 @@ void add_values(const HeldVersion& edge, std::uint32_t index, const PushedQuery&
 }
 
 }  // namespace
+
+void join_histories(std::vector<PushedValue>& values) {
+  std::map<std::uint32_t, std::size_t> begun;  // the last such entry, by edge
+  std::vector<std::size_t> ends;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    PushedValue& value = values[i];
+    if (!value.process_noise) continue;
+    const auto before = begun.find(value.index);
+    if (before != begun.end() && values[before->second].history < value.history) {
+      value.kept_before = values[before->second].stamp;
+      value.continues = values[before->second].history;
+      ends.push_back(before->second);
+    }
+    if (value.stamp) begun[value.index] = i;
+  }
+  std::sort(ends.begin(), ends.end());
+  for (auto end = ends.rbegin(); end != ends.rend(); ++end) {
+    values.erase(values.begin() + static_cast<std::ptrdiff_t>(*end));
+  }
+}
 
 PushedCommit Forest::values_since(std::vector<EdgeCursor>& cursors,
                                   const PushedQuery& query) const {

@@ -45,7 +45,21 @@ struct PushedValue {
   bool cleared = false;
   /// The edge is dynamic, and had no sample yet: the value is that of no instant.
   bool unsampled = false;
+  /// Of the first value reported of a history, for who has the history of the number `continues`:
+  /// what that has before this instant stays, and all from then on follows. Such a history is
+  /// reported as two (join_histories()).
+  std::optional<Time> kept_before{};
+  std::uint64_t continues = 0;
 };
+
+/// Puts such reports together: the first value of a history, after an entry that repeats the one
+/// before as if it began again, goes on from that up to the entry's stamp. So it says the same to
+/// those who know nothing of that.
+void join_histories(std::vector<PushedValue>& values);
+
+/// Whether the correlation is what an observation has found about the sample, instead of what is
+/// said of its edge.
+[[nodiscard]] bool is_of_sample(const PushedValue& value);
 
 /// Whether two values are the same, so that one need not be told after the other.
 [[nodiscard]] inline bool same(const Transform& a, const Transform& b) {

@@ -122,6 +122,7 @@ SampleHistory::Pointer SampleHistory::copy(std::uint64_t capacity, std::uint64_t
   const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
   copy->left_behind = left_behind;
+  copy->earlier_ = earlier_;
   copy->made_up_end_.store(made_up_end_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   copy->first_.store(first, std::memory_order_relaxed);
   copy->next_ = std::max(first, end);
@@ -145,6 +146,44 @@ SampleHistory::Pointer SampleHistory::with(const Sample& sample, std::uint64_t p
   }
   with_one->find_ends();
   return with_one;
+}
+
+SampleHistory::Pointer SampleHistory::without(const Range& range, std::uint64_t room,
+                                              SampleStore& store) const {
+  std::uint64_t capacity = mask_ + 1;
+  while ((range.first + room) / kSize - oldest() / kSize >= capacity) capacity *= 2;
+  auto rest = copy(capacity, range.first - range.first % kSize);
+  for (std::uint64_t number = rest->next_; number < next_; ++number) {
+    if (is_last_of_chunk(number)) store.supersede(chunk(number));
+  }
+  for (std::uint64_t number = rest->next_; number < range.first; ++number) {
+    rest->append(*at(number), store);
+  }
+  for (std::uint64_t number = range.first; number < range.end; ++number) {
+    store.release(at(number)->shared);
+  }
+  return rest;
+}
+
+void SampleHistory::continue_from(const SampleHistory& before, const Range& replaced,
+                                  std::uint64_t history, std::int64_t kept_before) {
+  left_behind = false;
+  const std::uint64_t made_up = before.made_up_end();
+  if (made_up > replaced.end) {
+    made_up_end_.store(made_up + next_ - before.next_, std::memory_order_relaxed);
+  } else if (made_up > replaced.first) {
+    // Which one before it was made up, is not known.
+    made_up_end_.store(replaced.first, std::memory_order_relaxed);
+  }
+  for (Earlier& one : earlier_) one.kept_before = std::min(one.kept_before, kept_before);
+  std::rotate(earlier_.begin(), earlier_.end() - 1, earlier_.end());
+  earlier_.front() = {history, kept_before};
+}
+
+std::int64_t SampleHistory::kept_before(std::uint64_t history) const {
+  const auto found = std::find_if(earlier_.begin(), earlier_.end(),
+                                  [history](const Earlier& one) { return one.history == history; });
+  return history != 0 && found != earlier_.end() ? found->kept_before : kAlways;
 }
 
 SampleHistory::Pointer SampleHistory::replaced(const Sample& sample, std::uint64_t place,

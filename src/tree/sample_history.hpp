@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -145,6 +146,13 @@ class SampleHistory {
     sample.set(value);
     if (is_first) find_first();
   }
+  /// Adds a sample that another history has given up to this one.
+  void append(const Sample& sample, SampleStore& store) {
+    const bool is_first = count() == 0;
+    add(store) = sample;
+    ends_.newest_shared = sample.shared;
+    if (is_first) find_first();
+  }
 
   [[nodiscard]] std::int64_t first_stamp() const { return ends_.first_stamp; }
 
@@ -169,6 +177,26 @@ class SampleHistory {
   /// A copy in which `sample` replaces one with the same stamp.
   [[nodiscard]] Pointer replaced(const Sample& sample, std::uint64_t place,
                                  SampleStore& store) const;
+
+  /// Consecutive samples: from the number `first` up to that before `end`.
+  struct Range {
+    std::uint64_t first = 0;
+    std::uint64_t end = 0;
+  };
+  /// The samples before a range, which is dropped with its samples. This history is superseded: the
+  /// samples after the range must be appended to the copy, after those that take its place.
+  /// @param room  how many samples the copy must have room for, besides
+  [[nodiscard]] Pointer without(const Range& range, std::uint64_t room, SampleStore& store) const;
+  /// As the history of an edge from which it was made by replacing a range of samples by others.
+  /// @param history  the edge's number of that history
+  /// @param kept_before  all samples before this instant are as they were
+  void continue_from(const SampleHistory& before, const Range& replaced, std::uint64_t history,
+                     std::int64_t kept_before);
+
+  /// The instant before which all is as in this earlier history of the edge; kAlways: not known.
+  [[nodiscard]] std::int64_t kept_before(std::uint64_t history) const;
+  /// Earlier histories of the edge have nothing in common with this one any more.
+  void forget_earlier() { earlier_ = {}; }
 
   /// Replaces a sample that no reader can see yet.
   void rewrite(const Sample& sample, std::uint64_t place) {
@@ -226,6 +254,12 @@ class SampleHistory {
     chunks_[(chunk->first / SampleChunk::kSize) & mask_].store(chunk, std::memory_order_release);
   }
 
+  // An earlier history of the edge, of which a rewrite has kept the beginning.
+  struct Earlier {
+    std::uint64_t history = 0;  // 0: none
+    std::int64_t kept_before = kAlways;
+  };
+
   // What the writer needs of the oldest and the newest sample. It is read before that, so that the
   // writer need not wait for memory that it last used some thousand samples ago.
   struct Ends {
@@ -243,6 +277,8 @@ class SampleHistory {
   std::atomic<std::uint64_t> made_up_end_{0};
   std::uint64_t next_ = 0;
   Ends ends_;
+  // The last ones, newest first: enough for watchers that get what is new many times a second.
+  std::array<Earlier, 4> earlier_;
   const Veiled<Arena> arena_;
   std::atomic<SampleChunk*>* const chunks_;
 };

@@ -2,6 +2,7 @@
 
 #include "support/json_schema.hpp"
 
+#include <chrono>
 #include <csignal>
 #include <fstream>
 #include <optional>
@@ -133,6 +134,12 @@ TEST_CASE("json: what each command prints is as the schema says") {
   checked.run(with_stddev({"add", "tool", "--parent", "camera"}));
   checked.run({"update", "arm_2", "--xyz", "0", "0", "1", "--stamp", "-2"});
   checked.run({"update", "arm_2", "--xyz", "0", "0", "2", "--stamp", "-1"});
+  const auto past = std::chrono::system_clock::now().time_since_epoch() - std::chrono::seconds(3);
+  checked.run(
+      {"rewrite", "arm_2",
+       directory.write("past.csv", "edge,stamp_ns,x,y,z\narm_2," +
+                                       std::to_string(std::chrono::nanoseconds(past).count()) +
+                                       ",0,0,1.5\n")});
   checked.run({"move", "tool", "--parent", "arm_2"});
   checked.run({"correlate", "hand_left", "--unknown"});
   checked.run({"correlate", "camera", "--source", "supply", "0", "0", "0", "0", "0", "0.002"});

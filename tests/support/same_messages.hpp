@@ -198,6 +198,18 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(std::get<DescriptionRequest>(actual.body).from == description->from);
   } else if (const auto* time = std::get_if<TimeRequest>(&expected.body)) {
     CHECK(std::get<TimeRequest>(actual.body).shown == time->shown);
+  } else if (const auto* rewrite = std::get_if<RewriteRequest>(&expected.body)) {
+    const auto& arrived = std::get<RewriteRequest>(actual.body);
+    CHECK(arrived.number == rewrite->number);
+    CHECK(arrived.interval.from == rewrite->interval.from);
+    CHECK(arrived.interval.to == rewrite->interval.to);
+    CHECK(arrived.total == rewrite->total);
+    CHECK(arrived.first == rewrite->first);
+    REQUIRE(arrived.samples.size() == rewrite->samples.size());
+    for (std::size_t i = 0; i < arrived.samples.size(); ++i) {
+      CHECK(arrived.samples[i].stamp == rewrite->samples[i].stamp);
+      check_same(arrived.samples[i].X_PC, rewrite->samples[i].X_PC);
+    }
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

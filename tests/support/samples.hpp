@@ -100,6 +100,17 @@ bool take(const Bytes& bytes) {
   return {random.pose(), StatedCovariance::unspecified()};
 }
 
+// The second sample has the covariance of the first.
+[[nodiscard]] inline RewriteRequest rewritten(Random& random) {
+  RewriteRequest part{18446744073709551615ULL, {time_of(1), time_of(INT64_MAX)}, 60'000, 256, {}};
+  for (const std::int64_t stamp : {2, 3, 4, 5}) {
+    part.samples.push_back({time_of(stamp), random.transform()});
+  }
+  part.samples[1].X_PC.covariance = part.samples[0].X_PC.covariance;
+  part.samples[3].X_PC = unspecified(random);
+  return part;
+}
+
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
@@ -150,6 +161,7 @@ bool take(const Bytes& bytes) {
       {42, "hand", MoveRequest{"arm", unspecified(random), 1}},
       {43, "hand",
        PartialUpdateRequest{{{"hand", {{}, {}, StatedCovariance::unspecified()}}}, time_of(1)}},
+      {36, "odom", rewritten(random)},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), {}},
        18446744073709551610ULL}};
 }

@@ -26,6 +26,7 @@
 #include "tfdude/types/cloud.hpp"
 #include "tfdude/types/correlation.hpp"
 #include "tfdude/types/edge.hpp"
+#include "tfdude/types/edge_sample.hpp"
 #include "tfdude/types/explanation.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/joint_spec.hpp"
@@ -124,6 +125,24 @@ class TFDUDE_EXPORT Client {
   /// @return kUnknownFrame, kInvalidInput (naming the part), kTooOld, kStampTaken.
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
                                             std::optional<Time> stamp = std::nullopt);
+
+  /// Replaces the samples of a dynamic edge within an interval, as SLAM does when it has closed a
+  /// loop: values, covariances and stamps. The owner does it in one commit, which it acknowledges:
+  /// every lookup, every watch and every recording has the history before, or the one after, and
+  /// never a part of it. What observations have found out about the replaced samples ends with
+  /// them; the given covariances count instead. Samples before and after the interval stay.
+  ///
+  /// Watchers are sent all samples from the interval on, at most kMaxRewritten. An owner in another
+  /// process gets the samples in several messages, and keeps none of them if they do not all come.
+  /// O(samples from the interval on).
+  /// @param interval  from its first to its last instant
+  /// @param samples  at least one; stamps within the interval, each later than the one before
+  /// @return kUnknownFrame, kTooOld (the first is older than the kept history), kTooMuch (more than
+  ///   the history keeps, or kMaxRewritten), kInvalidInput (naming the sample; an edge that is
+  ///   static or drifts), kUnsupported (an owner of an earlier version). Then nothing has changed,
+  ///   except after kTimeout, as with every call.
+  [[nodiscard]] Result<void> rewrite(const std::string& id, const TimeInterval& interval,
+                                     const std::vector<EdgeSample>& samples);
 
   /// Streams edge values to their owners without acknowledgement, for example joints at 1 kHz and
   /// more. Waits only until the owners can be reached, within the deadline of all calls. A share

@@ -44,6 +44,9 @@ struct WatchedValue {
   bool cleared = false;
   /// The edge is dynamic, and had no sample yet. The value, as configured, is that of no instant.
   bool unsampled = false;
+  /// Given with `begins` if the past was rewritten (Client::rewrite()): samples before this instant
+  /// still hold, and all from then on follow.
+  std::optional<Time> kept_before{};
 };
 
 /// What the owner has written in one commit, or in several consecutive ones. Samples of an edge are

@@ -64,6 +64,51 @@ constexpr auto kCorrelate = record(TFDUDE_FIELDS(correlation, AnyCorrelation()))
 constexpr auto kForget = record(TFDUDE_FIELD(incarnation, incarnation, kIncarnation),
                                 TFDUDE_FIELD(partition, partition, Text()));
 
+// Consecutive samples mostly have one covariance.
+struct RewrittenSamples {
+  static void check(CdrReader& in) {
+    in.sequence(kMostRewrittenAtOnce, [&] {
+      Instant::check(in);
+      Octet::check(in);
+      GivenTransform::check(in);
+    });
+  }
+  static void write(const std::vector<EdgeSample>& samples,
+                    std::vector<wire::RewrittenSample>& wire) {
+    wire.resize(samples.size());
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+      const Transform& X = samples[i].X_PC;
+      const bool as_before = i > 0 && X.covariance == samples[i - 1].X_PC.covariance;
+      Instant::write(samples[i].stamp, wire[i].stamp());
+      wire[i].covariance(as_before ? 1 : 0);
+      if (as_before) {
+        write_pose(X.pose, wire[i].x_pc());
+      } else {
+        GivenTransform::write(X, wire[i].x_pc());
+      }
+    }
+  }
+  static Result<void> read(const std::vector<wire::RewrittenSample>& wire,
+                           std::vector<EdgeSample>& samples, const Place& place) {
+    samples.resize(wire.size());
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+      Transform& X = samples[i].X_PC;
+      samples[i].stamp = time_of(wire[i].stamp());
+      if (auto ok = GivenTransform::read(wire[i].x_pc(), X, place); !ok) return ok;
+      const bool as_before = wire[i].covariance() != 0 && is_pose_only(wire[i].x_pc());
+      if (as_before && i > 0) X.covariance = samples[i - 1].X_PC.covariance;
+    }
+    return {};
+  }
+};
+
+constexpr auto kRewrite = Ruled(
+    record(TFDUDE_FIELD(since, interval.from, Instant()),
+           TFDUDE_FIELD(until, interval.to, Instant()), TFDUDE_FIELD(number, number, Count64()),
+           TFDUDE_FIELD(total, total, Count32()), TFDUDE_FIELD(first, first, Count32()),
+           TFDUDE_FIELD(samples, samples, RewrittenSamples())),
+    at_least_one(&RewriteRequest::samples, "a rewrite without samples"));
+
 // ---- observations
 
 // Whether an edge has a new value, and that value.
@@ -218,7 +263,7 @@ constexpr auto kBody = cases(
     TFDUDE_CASE(18, FramesRequest, structure, kFrames),
     TFDUDE_CASE(19, DescriptionRequest, description, kDescription),
     TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()),
-    TFDUDE_CASE(21, TimeRequest, time, kTime));
+    TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

@@ -155,6 +155,14 @@ std::vector<Request> random_requests(Random& random) {
   add(DescriptionRequest{random_count(random)});
   add(MemoryRequest{});
   add(TimeRequest{random_stamp(random)});
+  add(RewriteRequest{
+      random_count(random),
+      {random_stamp(random).value_or(Time()), random_stamp(random).value_or(Time())},
+      static_cast<std::uint32_t>(random_count(random)),
+      static_cast<std::uint32_t>(random_count(random)),
+      several(random, 1, [&] {
+        return EdgeSample{random_stamp(random).value_or(Time()), random_transform(random)};
+      })});
   return all;
 }
 

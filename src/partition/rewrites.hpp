@@ -1,0 +1,57 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tfdude/base/result.hpp"
+#include "tfdude/base/time.hpp"
+
+#include "partition/messages.hpp"
+
+namespace tfdude {
+
+/// An owner's rewrites of the past of which not all parts have come. Not thread-safe.
+/// @par Memory  Limited: kMost of them, of at most kMaxRewritten samples each, and only what has
+///   come.
+class Rewrites {
+ public:
+  static constexpr std::size_t kMost = 4;
+  /// One of which nothing has come for so long is dropped. Its sender repeats a part that is lost
+  /// much sooner.
+  static constexpr std::chrono::seconds kIdle{10};
+
+  /// Keeps a part. A part that has come before changes nothing.
+  /// @return all samples, once they have come: the rewrite is over then. kTooMuch (too many
+  ///   samples, or rewrites), kInvalidInput (the part does not fit the others, which are dropped)
+  [[nodiscard]] Result<std::optional<std::vector<EdgeSample>>> add(const PeerId& from,
+                                                                   const std::string& id,
+                                                                   const RewriteRequest& part,
+                                                                   Time now);
+  void forget(const PeerId& from, std::uint64_t number) { begun_.erase({from, number}); }
+  void forget_idle(Time now);
+
+ private:
+  struct Begun {
+    std::string id;
+    TimeInterval interval;
+    std::uint32_t total = 0;
+    Time heard{};
+    std::vector<EdgeSample> samples;                           // the first ones, without a gap
+    std::map<std::uint32_t, std::vector<EdgeSample>> further;  // by the place of the first
+    std::size_t ahead = 0;                                     // how many these are
+  };
+
+  [[nodiscard]] static bool fits(const Begun& begun, const std::string& id,
+                                 const RewriteRequest& part);
+  static void put(Begun& begun, const RewriteRequest& part);
+
+  std::map<std::pair<PeerId, std::uint64_t>, Begun> begun_;
+};
+
+}  // namespace tfdude

@@ -1,0 +1,119 @@
+#include "partition/rewrites.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/random.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::outcome;
+using testing::Random;
+
+constexpr PeerId kPeer{1};
+constexpr Time kNow{1000s};
+
+// The parts of so many samples, each of which says its place.
+std::vector<RewriteRequest> parts_of(std::uint32_t total, std::uint32_t each,
+                                     std::uint64_t number = 1) {
+  std::vector<RewriteRequest> parts;
+  for (std::uint32_t first = 0; first < total; first += each) {
+    RewriteRequest part{number, {Time(0s), Time(100s)}, total, first, {}};
+    for (std::uint32_t i = first; i < std::min(first + each, total); ++i) {
+      part.samples.push_back({time_of(i), along_x(i)});
+    }
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+bool is_whole(const std::vector<EdgeSample>& samples, std::size_t total) {
+  if (samples.size() != total) return false;
+  for (std::size_t i = 0; i < total; ++i) {
+    if (samples[i].stamp != time_of(static_cast<std::int64_t>(i))) return false;
+  }
+  return true;
+}
+
+TEST_CASE("a rewrite is whole with its last part, after the others in any order, and twice") {
+  Random random(5);
+  INFO("seed " << random.seed());
+  for (int round = 0; round < 50; ++round) {
+    Rewrites rewrites;
+    const auto total = static_cast<std::uint32_t>(1 + random.index(2000));
+    auto parts = parts_of(total, 1 + static_cast<std::uint32_t>(random.index(256)));
+    const RewriteRequest last = parts.back();
+    parts.pop_back();
+    std::shuffle(parts.begin(), parts.end(), random.engine());
+    for (const RewriteRequest& part : parts) {
+      for (std::size_t times = 1 + random.index(2); times > 0; --times) {
+        const auto all = rewrites.add(kPeer, "odom", part, kNow);
+        REQUIRE(all);
+        REQUIRE_FALSE(*all);
+      }
+    }
+    const auto all = rewrites.add(kPeer, "odom", last, kNow);
+    REQUIRE(all);
+    REQUIRE(*all);
+    CHECK(is_whole(**all, total));
+  }
+}
+
+TEST_CASE("rewrites of different senders and numbers do not mix") {
+  Rewrites rewrites;
+  const auto one = parts_of(4, 2, 1);
+  const auto two = parts_of(2, 1, 2);
+  CHECK_FALSE(*rewrites.add(kPeer, "odom", one[0], kNow));
+  CHECK_FALSE(*rewrites.add({2}, "odom", two[0], kNow));
+  CHECK_FALSE(*rewrites.add(kPeer, "odom", two[0], kNow));
+  CHECK(is_whole(**rewrites.add(kPeer, "odom", one[1], kNow), 4));
+  CHECK(is_whole(**rewrites.add({2}, "odom", two[1], kNow), 2));
+}
+
+TEST_CASE("what an owner keeps of unfinished rewrites is limited, in number, size and time") {
+  Rewrites rewrites;
+  RewriteRequest large = parts_of(1, 1)[0];
+  large.total = kMaxRewritten + 1;
+  CHECK(outcome(rewrites.add(kPeer, "odom", large, kNow)) == "too_much");
+  for (std::uint64_t i = 0; i < Rewrites::kMost; ++i) {
+    CHECK(rewrites.add(kPeer, "odom", parts_of(2, 1, i)[0], kNow));
+  }
+  const RewriteRequest more = parts_of(2, 1, 77)[0];
+  CHECK(outcome(rewrites.add(kPeer, "odom", more, kNow)) == "too_much");
+  CHECK(is_whole(**rewrites.add(kPeer, "odom", parts_of(2, 1, 0)[1], kNow), 2));
+  CHECK(rewrites.add(kPeer, "odom", more, kNow));
+  CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[0], kNow)) == "too_much");
+  rewrites.forget_idle(kNow + 1s);
+  CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[0], kNow)) == "too_much");
+  rewrites.forget_idle(kNow + Rewrites::kIdle + 1s);
+  CHECK_FALSE(*rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[0], kNow));
+  rewrites.forget(kPeer, 78);
+  // A sender of all parts must not believe that it is done.
+  CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[1], kNow)) == "changed_meanwhile");
+  CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 77)[1], kNow)) == "changed_meanwhile");
+}
+
+TEST_CASE("a part that does not fit the others ends its rewrite") {
+  const auto wrong = GENERATE(0, 1, 2, 3, 4, 5);
+  Rewrites rewrites;
+  const auto parts = parts_of(6, 2);
+  REQUIRE(rewrites.add(kPeer, "odom", parts[0], kNow));
+  RewriteRequest part = parts[1];
+  if (wrong == 0) part.total = 7;
+  if (wrong == 1) part.interval.to = Time(101s);
+  if (wrong == 2) part.first = 5;
+  if (wrong == 3) part.first = 4'000'000'000U;
+  if (wrong == 4) part.samples.clear();
+  CHECK(outcome(rewrites.add(kPeer, wrong == 5 ? "other" : "odom", part, kNow)) == "invalid_input");
+  CHECK_FALSE(*rewrites.add(kPeer, "odom", parts[1], kNow));
+  CHECK_FALSE(*rewrites.add(kPeer, "odom", parts[0], kNow));
+  CHECK(is_whole(**rewrites.add(kPeer, "odom", parts[2], kNow), 6));
+}
+
+}  // namespace
+}  // namespace tfdude
