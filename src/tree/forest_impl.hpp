@@ -214,6 +214,9 @@ class Forest::Impl {
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
+  /// Takes a late pose of an edge that drifts, for the stamp of an observation.
+  void give_between(const HeldVersion& newest, const Sample& there, const Pose& G_PC)
+      TFDUDE_REQUIRES(mutex_);
   void push_of_drift(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void push_checked(const HeldVersion& old, const GivenValue& value, std::int64_t stamp)
