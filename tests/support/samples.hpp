@@ -269,7 +269,7 @@ bool take(const Bytes& bytes) {
        1,
        4294967295U},
       {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}},
-      {6, {{0, {}, random.transform(), {}, 9, Covariance(), 0, false, true}}}};
+      {6, {{0, {}, random.transform(), {}, 9, Covariance(), false, 0, false, true}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {
