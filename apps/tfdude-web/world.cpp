@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "tfdude/math/belief.hpp"
 #include "tfdude/math/interpolate.hpp"
 
 namespace tfdude::web {
@@ -13,16 +14,13 @@ constexpr std::chrono::seconds kKept{60};
 constexpr std::size_t kMostSamples = 1'000'000;
 constexpr std::size_t kMostSamplesOfEdge = 2000;
 
-// With what common errors add. Their correlation between edges is left out.
+// With common errors. Their correlation between edges is left out.
 StatedCovariance whole(const WatchedValue& value) {
   if (value.correlation.common_errors.empty()) return value.X_PC.covariance;
-  Matrix6d sigma = value.X_PC.covariance.of_specified().matrix();
-  for (const CommonError& error : value.correlation.common_errors) {
-    if (!error.subtracts) sigma += error.loading * error.loading.transpose();
-  }
-  const Covariance all = Covariance::trusted(sigma);
-  return value.X_PC.covariance.complete() ? StatedCovariance(all)
-                                          : StatedCovariance::incomplete(all);
+  Belief X{value.X_PC.pose, value.X_PC.covariance.of_specified(), {}, {}};
+  X.common_errors = value.correlation.common_errors;
+  X.unspecified = !value.X_PC.covariance.complete();
+  return collapse(X).covariance;
 }
 
 Transform transform_of(const Pose& pose, const std::shared_ptr<const StatedCovariance>& sigma) {

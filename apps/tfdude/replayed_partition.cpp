@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/math/belief.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -19,6 +20,17 @@ Correlation replayed(Correlation correlation) {
     error.source = std::string(kReplayedPrefix) + error.source.substr(kObservedPrefix.size());
   }
   return correlation;
+}
+
+// A sample with its own correlation as one of which only that of its edge is known.
+Transform whole(const WatchedValue& value, const Correlation& of_edge) {
+  const auto& said = of_edge.common_errors;
+  Belief X{value.X_PC.pose, value.X_PC.covariance.of_specified(), {}, {}};
+  for (const CommonError& error : value.correlation.common_errors) {
+    if (std::count(said.begin(), said.end(), error) == 0) X.common_errors.push_back(error);
+  }
+  X.unspecified = !value.X_PC.covariance.complete();
+  return collapse(X);
 }
 
 // A process of an earlier version may have had an id that no new frame gets.
@@ -53,8 +65,9 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
     FrameSpec spec{frame.id, frame.parent, {}};
     Edge edge{frame.parent, false, Correlation()};
     if (known[i] != nullptr) {
-      spec.X_PC = known[i]->X_PC;
-      spec.correlation = replayed(known[i]->correlation);
+      const bool of_sample = known[i]->of_sample();
+      spec.X_PC = of_sample ? whole(*known[i], {}) : known[i]->X_PC;
+      if (!of_sample) spec.correlation = replayed(known[i]->correlation);
       edge.correlation = spec.correlation;
       const bool unsampled = known[i]->unsampled;
       const Covariance noise = known[i]->begins.value_or(Covariance());
@@ -195,8 +208,9 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
     if (served == served_.end() || frame.parent.empty()) continue;
     Edge& edge = served->second;
     Correlation correlation = replayed(value.correlation);
+    const bool of_sample = value.of_sample();
     const auto correlates = [&] {
-      return !edge.correlation || !(correlation == *edge.correlation);
+      return !of_sample && (!edge.correlation || !(correlation == *edge.correlation));
     };
     const bool plain = !correlates() && !value.begins && !value.cleared;
     if (!plain || value.stamp != stamp_) {
@@ -223,7 +237,8 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
     }
     if (!value.stamp && edge.dynamic) continue;
     edge.dynamic = value.stamp.has_value();
-    batch_.push_back({frame.id, value.X_PC});
+    batch_.push_back({frame.id, of_sample ? whole(value, edge.correlation.value_or(Correlation()))
+                                          : value.X_PC});
   }
   return flush();
 }

@@ -171,8 +171,9 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
   const std::string source = source_ + "." + std::to_string(attempts_);
-  const auto edges = edges_of(path);
-  if (!edges) return tl::unexpected(edges.error());
+  auto edges = edges_of(path);
+  if (!edges) return tl::unexpected(std::move(edges.error()));
+  untie_outdated(plan_, path, *edges);
   const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
       *edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);

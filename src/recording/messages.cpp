@@ -33,6 +33,9 @@ std::int64_t stamp_of(const WatchedValue& value) {
 
 enum class CovarianceIs : std::uint8_t { kGiven = 0, kUnspecified = 1, kAsBefore = 2 };
 
+// Whether the value begins a history of its edge.
+enum class Begins : std::uint8_t { kNot = 0, kAnew = 1, kDrifting = 2 };
+
 void put_upper(CdrWriter& writer, const Covariance& covariance) {
   writer.u32(Covariance::kSize);
   writer.f64s(covariance.upper());
@@ -117,7 +120,10 @@ void ValuesEncoder::add(const WatchedFrame& edge, const WatchedValue& value, boo
                           : as_before            ? CovarianceIs::kAsBefore
                                                  : CovarianceIs::kGiven;
   writer_.u8(static_cast<std::uint8_t>(is));
-  writer_.flag(value.begins.has_value());
+  const Begins begins = !value.begins  ? Begins::kNot
+                        : value.drifts ? Begins::kDrifting
+                                       : Begins::kAnew;
+  writer_.u8(static_cast<std::uint8_t>(begins));
   const Flat flat = to_flat(value.X_PC);
   for (std::size_t i = 0; i < 7; ++i) writer_.f64(flat[i]);
   if (is == CovarianceIs::kGiven) {
@@ -148,7 +154,7 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   recorded.edge.parent = reader.text();
   const std::int64_t stamp = reader.i64();
   const auto is = static_cast<CovarianceIs>(reader.u8());
-  const bool begins = reader.flag();
+  const auto begins = static_cast<Begins>(reader.u8());
   Flat flat{};
   for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
   bool valid = is_edge(recorded.edge) && stamp >= kUnsampled && stamp <= kMaxTime;
@@ -173,8 +179,9 @@ std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
   if (stamp >= 0) recorded.value.stamp = time_of(stamp);
   recorded.value.cleared = stamp == kCleared;
   recorded.value.unsampled = stamp == kUnsampled;
-  if (!begins) return recorded;
+  if (begins == Begins::kNot) return recorded;
   recorded.value.begins.emplace();
+  recorded.value.drifts = begins == Begins::kDrifting;
   if (noise) {
     const auto checked = Covariance::from_upper(*noise);
     if (!checked) return std::nullopt;

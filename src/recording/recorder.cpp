@@ -93,7 +93,8 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     const bool late =
         !value.begins && !value.cleared && edge.newest && value.stamp < edge.newest->stamp;
     if (late) {
-      edge.newest->correlation = value.correlation;
+      const bool of_samples = value.of_sample() || edge.newest->of_sample();
+      if (!of_samples) edge.newest->correlation = value.correlation;
       continue;
     }
     // A static edge that becomes dynamic is no longer one of the statics.
@@ -105,7 +106,9 @@ Result<void> Recorder::write(const std::string& name, Known& known, const Values
     newest.correlation = value.correlation;
     newest.cleared = value.cleared;
     newest.unsampled = value.unsampled;
-    if (value.begins) newest.begins = value.begins;
+    if (!value.begins) continue;
+    newest.begins = value.begins;
+    newest.drifts = value.drifts;
   }
   encoder.finish();
   if (auto ok = put(Topic::kValues, now, publish); !ok) return ok;

@@ -52,13 +52,17 @@ uint8 GIVEN = 0
 uint8 UNSPECIFIED = 1
 uint8 AS_BEFORE = 2 # as in the edge's value before this one
 uint8 covariance_is
-bool begins         # a new history: earlier values of the edge do not hold any more
+uint8 NOT = 0
+uint8 ANEW = 1      # a new history: earlier values of the edge do not hold any more
+uint8 DRIFTING = 2  # the same, and its error goes on from each sample to the next
+uint8 begins
 float64[7] pose     # x, y, z, w of the unit quaternion; x, y, z [m]
 # Upper triangle of the 6x6 covariance, row by row, of the right perturbation: translation [m],
 # then rotation [rad]. Without the part that is shared with other edges.
 float64[] covariance
 float64[] process_noise  # per second; likewise; with `begins`, if there is any
-# How the error of the edge is correlated with others, from the last of its values here on.
+# How the error of the edge is correlated with others, from the last of its values here on. If a
+# sample names edges that it was observed with: how the error of this sample is.
 bool unknown        # its own part may be correlated with anything
 CommonError[] common_errors
 string[] observed_with

@@ -149,6 +149,7 @@ void State::apply(const RecordedValues& recorded, bool foreign) {
     value.kept_before = one.value.kept_before;
     value.cleared = one.value.cleared;
     value.unsampled = one.value.unsampled;
+    value.drifts = one.value.drifts;
     const bool first = valueless_.erase(one.edge.id) > 0;
     if (first && !value.process_noise) value.process_noise = Covariance();
     edges.push_back(*handle);
@@ -297,10 +298,10 @@ std::vector<PartitionNews> State::news() const {
       ++place;
     }
     ValuesNews values;
-    for (PushedValue& value : forest_.values_since(cursors, {true, {}}).values) {
+    for (PushedValue& value : forest_.values_since(cursors, {true, {}, false, true}).values) {
       values.values.push_back({places[value.index], value.stamp, value.X,
                                std::move(value.correlation), value.process_noise, value.cleared,
-                               value.unsampled});
+                               value.unsampled, value.drifts});
     }
     all.push_back({name, std::move(values)});
   }

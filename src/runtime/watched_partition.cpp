@@ -17,10 +17,11 @@ constexpr std::uint32_t kGone = UINT32_MAX;
 // Edges that were written within this time of the newest sample are those that are streamed.
 constexpr std::chrono::seconds kStreamed{1};
 
-// Gives each value of an edge the correlation that its last one has.
+// Gives each value of an edge the correlation that is said of it with the last one.
 void spread_correlations(std::vector<PushedValue>& entries) {
   std::map<std::uint32_t, const Correlation*> last;
   for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
+    if (is_of_sample(*entry)) continue;
     const auto [known, is_last] = last.emplace(entry->index, &entry->correlation);
     if (!is_last) entry->correlation = *known->second;
   }
@@ -88,6 +89,7 @@ std::vector<Watched::Group> WatchedPartition::group() {
     if (groups.empty() || planned_.groups.back().frames.size() == most_) {
       WatchRequest request;
       request.period = period_;
+      request.of_samples = true;
       planned_.groups.push_back({});
       groups.push_back({0, {planned_.owner, name_, Request{0, frame.id, request}}});
     }
@@ -229,10 +231,16 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   const bool goes_on = begins && entry.continues == known.history;
   // Another group, or a reply, has told the edge's value as of a later commit.
   const bool is_old = !begins && message.commit <= known.commit;
-  if (is_old) entry.correlation = known.correlation;
+  const bool of_sample = is_of_sample(entry);
+  if (is_old && !of_sample) entry.correlation = known.said;
   const bool late = !begins && entry.stamp && known.newest && *entry.stamp < *known.newest;
   if (!begins && !is_news(entry, known, message, late)) return;
-  known.correlation = entry.correlation;
+  if (!of_sample) {
+    if (!late || known.correlation == known.said) known.correlation = entry.correlation;
+    known.said = entry.correlation;
+  } else if (!late) {
+    known.correlation = entry.correlation;
+  }
   if (begins || entry.cleared) known.told.clear();
   if (missing_from_ && entry.stamp) {
     const Known::Told one{*entry.stamp, hash_of(entry.X)};
@@ -256,6 +264,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   if (!begins) return;
   values.back().begins = entry.process_noise;
   if (goes_on) values.back().kept_before = entry.kept_before;
+  values.back().drifts = entry.drifts;
 }
 
 bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {

@@ -69,7 +69,8 @@ class WatchedPartition final : public Watched {
     std::uint64_t commit = 0;   // as of which its value is known
     std::optional<Time> newest;
     Transform X;
-    Correlation correlation;
+    Correlation said;
+    Correlation correlation;  // of its value: of the newest sample alone, or as said
     bool cleared = false;
     bool unsampled = false;
     using Told = std::pair<Time, std::size_t>;  // a stamp, and the hash of its value

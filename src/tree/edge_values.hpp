@@ -140,7 +140,7 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
     typename Edge::Copy copy;
     const Correlation* said = nullptr;
     if (!from.find_said(copy, said)) return not_readable();
-    if (revised || said != nullptr) {
+    if (revised || said != nullptr || samples.drifts()) {
       const CorrelatedValue ahead =
           extrapolate_correlated(before, newest, edge.X_PC, s, said, samples.drifts());
       return accumulate_correlated(path, ahead, samples, noise);

@@ -172,7 +172,7 @@ const Sample* observed_after(const HeldVersion& edge, std::int64_t t) {
 
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
                                  std::int64_t stamp) {
-  SampleRevision fresh{revision.X_PC, revision.correlation, true};
+  SampleRevision fresh{revision.X_PC, revision.correlation, true, false};
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
     const std::uint64_t place = samples.place_of(stamp);
@@ -180,10 +180,12 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
     if (after != nullptr && after->stamp == stamp) {
       fresh.given = given(*after);
+      fresh.between = is_between(*after);
     } else if (after != nullptr && before != nullptr) {
       const double s = static_cast<double>(stamp - before->stamp) /
                        static_cast<double>(after->stamp - before->stamp);
       interpolate(given(*before), given(*after), s, fresh.given);
+      fresh.between = true;
     }
   }
   const std::uint32_t slot = newest.slot;
@@ -198,7 +200,8 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     const CorrelatedValue value =
         drifted(before, nullptr, given(later).pose, samples.timing().process_noise,
                 static_cast<double>(at - before.stamp) * 1e-9);
-    const SampleRevision moved{{given(later).pose, {}}, value.correlation};
+    const SampleRevision moved{
+        {given(later).pose, {}}, value.correlation, false, is_between(later)};
     replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
   }
   if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
@@ -227,6 +230,11 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
     if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
     return push_checked(newest, {X_PC}, stamp);
   }
+  const std::uint64_t place = newest.samples->place_of(stamp);
+  if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
+    const Sample& there = *newest.samples->sample(place);
+    if (is_between(there)) return give_between(newest, there, value.X_PC.pose);
+  }
   const Sample& before = *newest.samples->sample(newest.number);
   const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
   // A late value counts as no more certain than the newest one.
@@ -237,6 +245,17 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
   const SampleRevision revision{{G_PC, {}}, next.correlation};
   const std::uint32_t slot = newest.slot;
   push_checked(newest, {next.X_PC, nullptr, &revision}, stamp);
+  show_revision(slot);
+}
+
+// What was seen at the stamp stays, and so do the later samples. The way to it and from it is now
+// known.
+void Forest::Impl::give_between(const HeldVersion& newest, const Sample& there, const Pose& G_PC) {
+  const Transform X = there.value();
+  const SharedRevision& before = *there.revision();
+  const SampleRevision revision{{G_PC, {}}, before.correlation(), before.observed, false};
+  const std::uint32_t slot = newest.slot;
+  replace_sample(newest, {X, nullptr, &revision}, there.stamp);
   show_revision(slot);
 }
 

@@ -165,6 +165,7 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const PushedValue& told, bool replace)
       TFDUDE_REQUIRES(mutex_);
+  void take_said(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   void begin_told_history(std::uint32_t slot, const PushedValue& value) TFDUDE_REQUIRES(mutex_);
 
   // Correlations (forest_correlation.cpp).
@@ -238,6 +239,9 @@ class Forest::Impl {
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);
+  /// Takes a late pose of an edge that drifts, for the stamp of an observation.
+  void give_between(const HeldVersion& newest, const Sample& there, const Pose& G_PC)
+      TFDUDE_REQUIRES(mutex_);
   void push_of_drift(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void push_checked(const HeldVersion& old, const GivenValue& value, std::int64_t stamp)

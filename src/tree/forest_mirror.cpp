@@ -29,18 +29,14 @@ std::vector<const PushedValue*> samples_from(const std::vector<PushedValue>& val
 
 }  // namespace
 
-bool is_of_sample(const PushedValue& value) {
-  const auto& common_errors = value.correlation.common_errors;
-  return value.stamp && std::any_of(common_errors.begin(), common_errors.end(), is_observed);
-}
-
 // The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
   HeldVersion& fresh = push_held(slot, value.X);
   forget_history(fresh);
-  if (value.process_noise->upper() == Covariance::Upper{}) return;
+  if (value.process_noise->upper() == Covariance::Upper{} && !value.drifts) return;
   EdgeTiming timing = default_timing_;
   timing.process_noise = *value.process_noise;
+  timing.drifts = value.drifts;
   SampleHistory::destroy(fresh.samples);  // no reader has seen it
   fresh.samples = SampleHistory::create(*arena_, timing).release();
 }
@@ -65,9 +61,19 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& 
     if (!check_sample(edge, stamp)) return false;
   }
   const std::uint32_t slot = edge.slot;
-  push_value(slot, value, stamp);
+  push_checked(edge, value, stamp);
   if (observed) show_revision(slot);
   return true;
+}
+
+// A correlation of the newest sample alone stays.
+void Forest::Impl::take_said(std::uint32_t slot, const Correlation& said) {
+  HeldVersion& fresh = push_held(slot, frames_.newest_value(slot).X_PC);
+  if (fresh.correlation != nullptr && fresh.correlation->revised()) {
+    return correlate(fresh, said, fresh.correlation->now());
+  }
+  if (said.empty()) return set_correlation(fresh, nullptr);
+  correlate(fresh, said);
 }
 
 bool Forest::Impl::push_told(const HeldVersion& edge, const PushedValue& value, bool replace) {
@@ -127,14 +133,13 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
   std::vector<bool> correlated(edges.size(), false);
   for (auto value = values.rbegin(); value != values.rend(); ++value) {
     const HeldVersion* edge = edge_of(*value);
-    if (edge == nullptr || correlated[value->index]) continue;
+    if (edge == nullptr || correlated[value->index] || is_of_sample(*value)) continue;
     if (!check_common_errors(value->correlation.common_errors)) continue;
     correlated[value->index] = true;
-    if (is_of_sample(*value)) continue;
     const Correlation before =
         edge->correlation != nullptr ? edge->correlation->said() : Correlation();
     if (before == value->correlation) continue;
-    impl_->say_correlation(edge->slot, value->correlation);
+    impl_->take_said(edge->slot, value->correlation);
     changed = true;
   }
   if (changed) impl_->commit();

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "tree/forest_impl.hpp"
@@ -121,6 +122,7 @@ class Telling {
  private:
   void tell_between(const Sample& before, const Sample& after);
   void tell(const Sample& sample);
+  void tell_row(std::int64_t stamp, const Transform& X, const Correlation& row);
   void tell_newest();
 
   const HeldVersion& edge_;
@@ -140,8 +142,13 @@ void Telling::tell(const Sample& sample) {
   if (!of_samples_ || !is_correlated(sample)) {
     return tell(time_of(sample.stamp), value_of(edge_, sample));
   }
-  tell(time_of(sample.stamp), sample.value());
-  values_.back().correlation = sample.revision()->correlation();
+  tell_row(sample.stamp, sample.value(), sample.revision()->correlation());
+}
+
+void Telling::tell_row(std::int64_t stamp, const Transform& X, const Correlation& row) {
+  tell(time_of(stamp), X);
+  Correlation& told = values_.back().correlation = row;
+  if (told.observed_with.empty()) told.observed_with.emplace_back(edge_.name->text);
 }
 
 // The edge's version may be newer than the sample that it shows.
@@ -150,8 +157,7 @@ void Telling::tell_newest() {
   if (!of_samples_ || correlation == nullptr || !correlation->revised()) {
     return tell(time_of(edge_.stamp), newest_of(edge_));
   }
-  tell(time_of(edge_.stamp), edge_.X_PC);
-  values_.back().correlation = correlation->now();
+  tell_row(edge_.stamp, edge_.X_PC, correlation->now());
 }
 
 void Telling::tell_newest(std::uint64_t seen) {
@@ -201,10 +207,13 @@ void Telling::finish(bool begins) {
   if (values_.size() == begin_) return;
   const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
   sort_by_stamp(begin, values_.end());
-  if (values_.back().correlation.empty()) values_.back().correlation = correlation_of(edge_);
+  const auto end = std::make_reverse_iterator(begin);
+  const auto last = std::find_if_not(values_.rbegin(), end, is_of_sample);
+  if (last != end) last->correlation = correlation_of(edge_);
   if (!begins) return;
-  begin->process_noise =
-      edge_.samples != nullptr ? edge_.samples->timing().process_noise : Covariance();
+  const EdgeTiming timing = edge_.samples != nullptr ? edge_.samples->timing() : EdgeTiming();
+  begin->process_noise = timing.process_noise;
+  begin->drifts = timing.drifts;
 }
 
 // The instant up to which a watcher has this history already, as that before it; kAlways: it has

@@ -233,13 +233,22 @@ SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
   return found;
 }
 
-// What an observation has found about the dynamic edge at that instant; null: nothing.
-const Correlation* row_at(const HeldVersion& edge, std::int64_t t) {
+// The edges that the dynamic edge's value at that instant was observed with. Between two samples it
+// depends on both, unless the edge drifts.
+std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t t) {
+  SampleHistory::Bracket found{edge.samples->sample(edge.number), nullptr};
   std::uint64_t back = 0;
-  const Sample* sample = t < edge.stamp ? edge.samples->around(t, edge.number, back).before
-                                        : edge.samples->sample(edge.number);
-  const bool there = sample != nullptr && (sample->stamp == t || edge.samples->timing().drifts);
-  return there ? correlation_at(*sample, nullptr) : nullptr;
+  if (t < edge.stamp) found = edge.samples->around(t, edge.number, back);
+  if (found.before != nullptr && found.before->stamp == t) found.after = nullptr;
+  if (edge.samples->timing().drifts) found.after = nullptr;
+  std::vector<std::string> all;
+  for (const Sample* sample : {found.before, found.after}) {
+    if (sample == nullptr || !is_correlated(*sample)) continue;
+    for (const std::string& id : sample->revision()->correlation().observed_with) {
+      if (std::count(all.begin(), all.end(), id) == 0) all.push_back(id);
+    }
+  }
+  return all;
 }
 
 // Going back, the drift of an interval counts so many times: it is a part of the later error, of
@@ -299,9 +308,8 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
       const std::int64_t t = nanoseconds(*found.stamp);
       const auto value = as_observed_later(*edge, t);
       if (value) set_value(found, i, *value);
-      const Correlation* row = value ? &value->correlation : row_at(*edge, t);
-      if (row == nullptr) continue;
-      std::copy_if(row->observed_with.begin(), row->observed_with.end(), std::back_inserter(with),
+      const auto others = value ? value->correlation.observed_with : observed_with_at(*edge, t);
+      std::copy_if(others.begin(), others.end(), std::back_inserter(with),
                    [&](const std::string& id) { return id != edge->name->text; });
     } else if (edge->correlation != nullptr) {
       found.correlations[i].observed_with = edge->correlation->now().observed_with;

@@ -133,6 +133,8 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
     }
   }
   HeldVersion& fresh = push_held(newest.slot, value.X_PC);
+  // With its beginning, watchers are told that the edge drifts.
+  if (!newest.moving() && drifts(newest)) fresh.history = fresh.commit;
   fresh.samples = samples;
   end_revision(fresh, value.revision);
   append_to(fresh, value, stamp);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -26,14 +27,16 @@ struct PushedValue {
   std::uint32_t index = 0;
   std::optional<Time> stamp;
   Transform X;
-  /// Of the edge, only with the last of its values; or of a sample that was observed
-  /// (PushedQuery::of_samples).
+  /// Of the edge, only with the last of its values of which this holds; or that of a sample, if an
+  /// observation has corrected it (is_of_sample()).
   Correlation correlation{};
   /// The number of the history of this value. A new history, with a higher number, starts when an
   /// edge is moved, added again, or loses its samples.
   std::uint64_t history = 0;
   /// Of the edge; only with the first value reported of a history.
   std::optional<Covariance> process_noise{};
+  /// With it: the edge drifts.
+  bool drifts = false;
   /// Identifies the covariance among those of this edge in its group of watchers
   /// (CovarianceNumbers); 0: not numbered.
   std::uint32_t covariance_number = 0;
@@ -57,13 +60,17 @@ struct PushedValue {
 /// those who know nothing of that.
 void join_histories(std::vector<PushedValue>& values);
 
-/// Whether the correlation is what an observation has found about the sample, instead of what is
-/// said of its edge.
-[[nodiscard]] bool is_of_sample(const PushedValue& value);
-
 /// Whether two values are the same, so that one need not be told after the other.
 [[nodiscard]] inline bool same(const Transform& a, const Transform& b) {
   return a.pose.matrix() == b.pose.matrix() && a.covariance == b.covariance;
+}
+
+/// Whether a value has the correlation of this sample alone. The edges that it was observed with,
+/// if only itself, tell that from what is said of its edge; of a segment, the sources do.
+[[nodiscard]] inline bool is_of_sample(const PushedValue& value) {
+  const auto& errors = value.correlation.common_errors;
+  return value.stamp && (!value.correlation.observed_with.empty() ||
+                         std::any_of(errors.begin(), errors.end(), is_observed));
 }
 
 /// Values written to edges up to a commit.

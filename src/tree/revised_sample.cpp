@@ -131,7 +131,7 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
                                        const Transform& X_newest, double s, const Correlation* said,
                                        bool drifts) {
   const double beyond = s - 1.0;
-  if (before.revision() == nullptr && after.revision() == nullptr) {
+  if (!drifts && before.revision() == nullptr && after.revision() == nullptr) {
     CorrelatedValue found;
     extrapolate(before, after, X_newest, s, found.X_PC);
     if (said == nullptr) return found;

@@ -47,6 +47,12 @@ struct CorrelatedValue {
   return revision != nullptr && !revision->correlation().empty();
 }
 
+/// Whether it is of an observation between two samples, and none was given for its stamp.
+[[nodiscard]] inline bool is_between(const Sample& sample) {
+  const SharedRevision* revision = sample.revision();
+  return revision != nullptr && revision->between;
+}
+
 /// How the error of a sample is correlated: as `said` of its edge, unless it was observed.
 [[nodiscard]] const Correlation* correlation_at(const Sample& sample, const Correlation* said);
 

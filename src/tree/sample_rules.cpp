@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/time.hpp"
 
+#include "tree/revised_sample.hpp"
 #include "tree/sample_history.hpp"
 
 namespace tfdude {
@@ -41,6 +42,8 @@ Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   const SampleHistory& samples = *newest.samples;
   const std::uint64_t place = samples.place_of(stamp);
   if (place < samples.next() && samples.stamp(place) == stamp) {
+    // An edge that drifts takes it for the way since the sample before (push_of_drift()).
+    if (samples.timing().drifts && is_between(*samples.sample(place))) return {};
     newest.name->refused.more().equal.fetch_add(1, std::memory_order_relaxed);
     return fail(Errc::kStampTaken, "frame " + quote(newest.name->text) +
                                        " has a sample of that stamp, " + to_string(time_of(stamp)));

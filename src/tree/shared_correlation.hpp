@@ -94,6 +94,7 @@ struct SampleRevision {
   Transform given;          ///< the sample before all observations
   Correlation correlation;  ///< of this sample, instead of what is said of the edge
   bool observed = false;    ///< itself; otherwise it follows from one that was
+  bool between = false;     ///< of an observation between two samples: none was given for the stamp
 };
 
 /// The same, for all who read the sample.
@@ -102,11 +103,14 @@ class SharedRevision {
   SharedRevision(Arena& arena, SampleRevision revision)
       : given(revision.given),
         observed(revision.observed),
+        between(revision.between),
         shared_(arena, std::move(revision.correlation)),
         arena_(&arena) {}
 
   const Transform given;
-  const bool observed;  ///< for the owner only
+  // For the owner only, as in SampleRevision.
+  const bool observed;
+  const bool between;
   [[nodiscard]] const Correlation& correlation() const { return *shared_; }
   [[nodiscard]] const FlatCorrelation* const& flat() const { return shared_.flat(); }
   [[nodiscard]] std::size_t bytes() const { return sizeof(*this) + shared_.bytes(); }

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -91,7 +92,119 @@ class Line {
   int steps_;
 };
 
+constexpr double kMount = 0.02;      // of a camera [m]
+constexpr double kLocalized = 0.03;  // of each sample [m]
+
+// world -> base is localized anew in each sample; two cameras on it, and two objects in the world.
+class Cameras {
+ public:
+  explicit Cameras(int steps) : sigma_(Eigen::MatrixXd::Zero(steps + 4, steps + 4)), steps_(steps) {
+    FrameSpec base{"base", "world", {along_x(0).pose, on_line(kLocalized * kLocalized)}};
+    base.timing = EdgeTiming();
+    base.timing->moving = true;
+    const Transform mount{along_x(0).pose, on_line(kMount * kMount)};
+    const Transform somewhere{along_x(1).pose, on_line(kMount * kMount)};
+    node_.emplace(Node::open(network_.join(), "robot",
+                             {{"world", "", {}},
+                              base,
+                              {"near", "world", somewhere},
+                              {"far", "world", somewhere},
+                              {"left", "base", mount},
+                              {"right", "base", mount}})
+                      .value());
+    sigma_.diagonal().head(steps).setConstant(kLocalized * kLocalized);
+    sigma_.diagonal().tail(4).setConstant(kMount * kMount);
+  }
+
+  void localize(int step) {
+    REQUIRE(node_->update("base", {along_x(0).pose, on_line(kLocalized * kLocalized)}, at(step)));
+  }
+
+  // Sees what it expects. @return by which factor the variance of what was seen is too large
+  double see(const std::string& from, const std::string& id, int step) {
+    const Query query = when(step);
+    const auto X = node_->lookup(from, id, query);
+    REQUIRE(X);
+    const auto found =
+        node_->observe(from, id, {X->pose, on_line(kSighting * kSighting)}, query.at);
+    REQUIRE(found);
+    const Eigen::VectorXd H = way(from, id, step);
+    const Eigen::VectorXd gain = sigma_ * H / (H.dot(sigma_ * H) + kSighting * kSighting);
+    sigma_ -= (gain * (H.transpose() * sigma_)).eval();
+    return ratio(from, id, step);
+  }
+
+  // The variance of a lookup, by that of the dense filter.
+  double ratio(const std::string& from, const std::string& id, int step) {
+    const Eigen::VectorXd H = way(from, id, step);
+    const auto X = node_->lookup(from, id, when(step)).value();
+    return X.covariance.of_specified().upper()[0] / H.dot(sigma_ * H);
+  }
+
+ private:
+  static Query when(int step) {
+    Query query;
+    query.at = at(step);
+    return query;
+  }
+  int index(const std::string& id) const {
+    static const std::vector<std::string> kStatic{"near", "far", "left", "right"};
+    return steps_ +
+           static_cast<int>(std::find(kStatic.begin(), kStatic.end(), id) - kStatic.begin());
+  }
+  // Adds the errors on the way from the world.
+  void add(const std::string& id, double sign, int step, Eigen::VectorXd& H) const {
+    if (id == "world") return;
+    if (id != "base") H(index(id)) += sign;
+    if (id == "base" || id == "left" || id == "right") H(step) += sign;
+  }
+  Eigen::VectorXd way(const std::string& from, const std::string& id, int step) const {
+    Eigen::VectorXd H = Eigen::VectorXd::Zero(sigma_.rows());
+    add(id, 1, step, H);
+    add(from, -1, step, H);
+    return H;
+  }
+
+  LoopbackNetwork network_;
+  std::optional<Node> node_;
+  Eigen::MatrixXd sigma_;  // of the base at each step, the objects, and the mounts
+  int steps_;
+};
+
 }  // namespace
+
+TEST_CASE("late observations: a sample that is seen again makes nothing overconfident") {
+  const int late = GENERATE(1, 2, 5);
+  CAPTURE(late);
+  Cameras line(kRounds + 1);
+  for (int step = 0; step < late; ++step) line.localize(step);
+  for (int step = late; step <= kRounds; ++step) {
+    line.localize(step);
+    for (const char* object : {"near", "far"}) CHECK(line.see("left", object, step) > 0.999);
+    for (const char* object : {"near", "far"}) line.see("right", object, step - late);
+    for (const char* object : {"near", "far"}) {
+      CAPTURE(step, object, line.ratio("world", object, step));
+      CHECK(line.ratio("world", object, step) > 0.999);
+    }
+    for (const char* camera : {"left", "right"}) {
+      CAPTURE(step, camera, line.ratio("base", camera, step));
+      CHECK(line.ratio("base", camera, step) > 0.999);
+    }
+  }
+  CHECK(line.ratio("world", "near", kRounds) < 1.3);
+  CHECK(line.ratio("base", "left", kRounds) < 1.6);
+}
+
+TEST_CASE("late observations: what a standing edge was observed with forgets no sample") {
+  Cameras line(4);
+  for (int step = 0; step < 4; ++step) line.localize(step);
+  line.see("left", "near", 3);
+  line.see("right", "near", 1);  // without the newest sample
+  line.see("left", "right", 1);  // beside which that sample is
+  line.see("left", "far", 3);
+  for (const char* id : {"near", "far"}) CHECK(line.ratio("world", id, 2) > 0.999);
+  for (const char* id : {"left", "right"}) CHECK(line.ratio("base", id, 2) > 0.999);
+}
 
 TEST_CASE("late observations: in the order of their instants they are exact") {
   Line line(kRounds + 1);

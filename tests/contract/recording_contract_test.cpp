@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -26,6 +27,7 @@
 namespace tfdude {
 namespace {
 
+using testing::Approx;
 using testing::eventually;
 using testing::Join;
 using testing::joined_by;
@@ -306,6 +308,163 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
   CHECK(greatest <= 1e-12);
   CHECK(answers > asked.size());
   std::filesystem::remove(file);
+}
+
+namespace {
+
+Covariance of_deviation(double sigma) {
+  return *Covariance::from_stddev({sigma, sigma, sigma, sigma, sigma, sigma});
+}
+
+// What a robot sees of two objects, recorded: one edge is localized anew in each sample, one shares
+// a named source besides, and one is odometry.
+class Seeing {
+ public:
+  explicit Seeing(const Join& join) {
+    const Transform at_start{Pose(), of_deviation(0.1)};
+    FrameSpec odometry{"odometry", "world", Transform::exact(Pose())};
+    odometry.timing = EdgeTiming();
+    odometry.timing->drifts = true;
+    odometry.timing->process_noise = of_deviation(0.05);
+    std::vector<FrameSpec> frames{{"world", "", {}}, odometry};
+    for (const char* id : {"plain", "sharing", "near", "far"}) {
+      frames.push_back({id, "world", at_start});
+    }
+    node_.emplace(Node::open(join("base"), "base", frames).value());
+    Loading supply = Loading::Zero(6, 1);
+    supply(0) = 0.05;
+    REQUIRE(node_->correlate("sharing", {false, {{"supply", false, supply}}, {}}));
+  }
+
+  void drive(int number) {
+    const Transform X{Pose(), of_deviation(0.1)};
+    for (const char* id : {"plain", "sharing"}) REQUIRE(node_->update(id, X, step(number)));
+    const Pose G = Pose::trusted(Eigen::Quaterniond::Identity(), {0.2 * number, 0, 0});
+    REQUIRE(node_->update("odometry", Transform::exact(G), step(number)));
+  }
+
+  void see(int number) {
+    for (const auto& [from, id] :
+         {std::pair("plain", "near"), std::pair("sharing", "far"), std::pair("odometry", "near")}) {
+      const auto X = node_->lookup(from, id, when(number)).value();
+      REQUIRE(node_->observe(from, id, {X.pose, of_deviation(0.01)}, step(number)));
+    }
+  }
+
+  static Query when(double number) {
+    Query query;
+    query.at = step(0) + std::chrono::milliseconds(std::lround(1000 * number));
+    query.extrapolate = std::chrono::seconds(1);
+    return query;
+  }
+
+  Node& node() { return *node_; }
+
+ private:
+  std::optional<Node> node_;
+};
+
+}  // namespace
+
+TEST_CASE("recording: what was observed is as certain as it was") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Seeing robot(join);
+  auto client = Client::open(join("")).value();
+  const std::string file = a_file();
+  const std::vector<std::string> names{"world", "odometry", "plain", "sharing", "near", "far"};
+  constexpr int kSteps = 8;
+  std::vector<Asked> asked;
+  {
+    std::mutex mutex;
+    std::set<std::pair<std::uint32_t, Time>> told;
+    auto writer = RecordingWriter::create(file, step(0)).value();
+    Time now = step(0);
+    const auto watch =
+        client.watch_partition("base", {0, [&](const PartitionNews& news) {
+                                          const std::lock_guard<std::mutex> lock(mutex);
+                                          if (!writer.add(news, now)) std::abort();
+                                          const auto* values = std::get_if<ValuesNews>(&news.what);
+                                          if (values == nullptr) return;
+                                          for (const WatchedValue& value : values->values) {
+                                            if (value.stamp && value.of_sample())
+                                              told.emplace(value.frame, *value.stamp);
+                                            if (value.stamp)
+                                              told.emplace(100 + value.frame, *value.stamp);
+                                          }
+                                        }});
+    REQUIRE(watch);
+    // Before DDS has matched the readers, first samples may be left out.
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    const auto has = [&](std::size_t count) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return told.size() >= count;
+    };
+    std::size_t count = 0;
+    for (int number = 1; number <= kSteps; ++number) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        now = step(number);
+      }
+      robot.drive(number);
+      count += 3;
+      if (number % 3 == 0) {
+        robot.see(number);
+        count += 3;
+      } else if (number > 3) {
+        count += 1;  // of odometry
+      }
+      REQUIRE(eventually([&] { return has(count); }));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    for (const double at : {2.0, 3.0, 3.4, 4.0, 6.0, 6.7, 7.0, 8.0, 8.5}) {
+      for (const auto& a : names) {
+        for (const auto& b : names) {
+          const Query query = Seeing::when(at);
+          asked.push_back({0, a, b, query, robot.node().lookup(a, b, query)});
+        }
+      }
+    }
+    REQUIRE(writer.finish(step(kSteps + 1)));
+  }
+  auto recording = Recording::open(file).value();
+  recording.seek(step(kSteps + 1));
+  for (const Asked& one : asked) {
+    INFO(one.a << " to " << one.b << " at " << (*one.query.at - step(0)).count());
+    const auto found = recording.lookup(one.a, one.b, one.query);
+    REQUIRE(found.has_value() == one.live.has_value());
+    if (!found) continue;
+    CHECK(difference(*found, *one.live) <= 1e-9);
+    CHECK(found->basis.sources == one.live->basis.sources);
+  }
+  // The last time it was seen with an error of 0.01: more than either had before.
+  const auto seen = recording.lookup("sharing", "far", Seeing::when(6)).value();
+  CHECK(std::sqrt(seen.covariance.of_specified().upper()[upper_index(1, 1)]) ==
+        Approx(0.01 / std::sqrt(1 + 0.01 * 0.01 / 0.02)).epsilon(1e-3));
+  std::filesystem::remove(file);
+}
+
+TEST_CASE("watch: an edge that drifts is as certain as a lookup says, at any instant") {
+  const Join join = joined_by(GENERATE(from_range(testing::networks())));
+  Seeing robot(join);
+  auto client = Client::open(join("")).value();
+  const auto watch = client.watch("world", "odometry");
+  REQUIRE(watch);
+  for (int number = 1; number <= 4; ++number) {
+    robot.drive(number);
+    if (number == 2) robot.see(number);
+    const auto has = [&] {
+      const auto X = watch->latest();
+      return X && X->stamp == step(number);
+    };
+    REQUIRE(eventually(has));
+  }
+  for (const double at : {2.0, 2.5, 3.0, 3.3, 4.0, 4.5}) {
+    INFO(at);
+    const Query query = Seeing::when(at);
+    const auto watched = watch->lookup(query);
+    REQUIRE(watched);
+    CHECK(difference(*watched, robot.node().lookup("world", "odometry", query).value()) <= 1e-9);
+  }
 }
 
 }  // namespace tfdude

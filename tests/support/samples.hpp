@@ -274,14 +274,14 @@ bool take(const Bytes& bytes) {
       {4,
        {{0, {}, random.transform(), {}, 18446744073709551615ULL, Covariance()},
         {1, time_of(7), Transform::exact({}), {}, 3, random.transform().covariance.of_specified()},
-        {1, time_of(8), Transform::exact({}), {}, 3, {}, 4294967295U},
-        {1, time_of(9), Transform{}, {}, 3, {}, 4294967295U, true}},
+        {1, time_of(8), Transform::exact({}), {}, 3, {}, false, 4294967295U},
+        {1, time_of(9), Transform{}, {}, 3, {}, false, 4294967295U, true}},
        5,
        18446744073709551615ULL,
        1,
        4294967295U},
       {5, {{0, time_of(7), unspecified(random)}, {1, {}, unspecified(random)}}},
-      {6, {{0, {}, random.transform(), {}, 9, Covariance(), 0, false, true}}}};
+      {6, {{0, {}, random.transform(), {}, 9, Covariance(), false, 0, false, true}}}};
 }
 
 [[nodiscard]] inline std::vector<Update> updates(Random& random) {

@@ -35,7 +35,7 @@ struct WatchedValue {
   std::uint32_t frame = 0;    ///< index among the last reported frames
   std::optional<Time> stamp;  ///< absent: it holds for all times, if nothing else is said below
   Transform X_PC;
-  /// Of the edge, from now on and for all its history.
+  /// Of the edge, from now on and for all its history; but see of_sample().
   Correlation correlation{};
   /// Process noise of the edge per second. Given with the first value of a history: what is known
   /// of the edge so far does not hold any more.
@@ -47,6 +47,12 @@ struct WatchedValue {
   /// Given with `begins` if the past was rewritten (Client::rewrite()): samples before this instant
   /// still hold, and all from then on follow.
   std::optional<Time> kept_before{};
+  /// With `begins`: the edge drifts (EdgeTiming::drifts).
+  bool drifts = false;
+
+  /// Whether the correlation is that of this sample alone, which an observation has corrected. What
+  /// is said of the edge stays.
+  [[nodiscard]] bool of_sample() const { return stamp && !correlation.observed_with.empty(); }
 };
 
 /// What the owner has written in one commit, or in several consecutive ones. Samples of an edge are

@@ -156,6 +156,16 @@ struct PushedBeginnings {
         wire.back().process_noise().assign(noise->upper().begin(), noise->upper().end());
       }
     }
+    for (std::size_t i = 0; i < pushed.entries.size() && room > 0; ++i) {
+      const PushedValue& entry = pushed.entries[i];
+      const bool has_no_sample = !entry.stamp && !entry.cleared;
+      if (!entry.drifts || !entry.process_noise || (has_no_sample && !entry.unsampled)) continue;
+      auto& again = wire.emplace_back();
+      again.entry(static_cast<std::uint32_t>(i));
+      again.process_noise().assign(entry.process_noise->upper().begin(),
+                                   entry.process_noise->upper().end());
+      --room;
+    }
   }
   static Result<void> read(const std::vector<wire::PushedBeginning>& wire, PushedValues& pushed,
                            const Place& place) {
@@ -169,7 +179,10 @@ struct PushedBeginnings {
         noise = *read;
       }
       PushedValue& entry = **found;
-      entry.unsampled = entry.process_noise && !entry.stamp && !entry.cleared;
+      const bool again = entry.process_noise.has_value();
+      const bool has_no_sample = !entry.stamp && !entry.cleared;
+      entry.drifts = again && (entry.unsampled || !has_no_sample);
+      entry.unsampled = again && has_no_sample;
       entry.process_noise = noise;
     }
     return {};

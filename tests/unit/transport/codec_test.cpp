@@ -183,7 +183,7 @@ TEST_CASE("a pushed value with a known covariance takes at most the bytes of tf2
   const auto bytes_of = [](std::size_t count) {
     PushedValues pushed;
     for (std::uint32_t i = 0; i < count; ++i) {
-      pushed.entries.push_back({i, time_of(1), Transform::exact({}), {}, 1, {}, 1, true});
+      pushed.entries.push_back({i, time_of(1), Transform::exact({}), {}, 1, {}, false, 1, true});
     }
     return testing::serialized<StateType>(to_wire(pushed)).size();
   };

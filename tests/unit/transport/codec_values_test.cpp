@@ -112,6 +112,32 @@ TEST_CASE("a pushed value of an edge that had no sample yet says so") {
   CHECK(all->entries[1].cleared);
 }
 
+TEST_CASE("a pushed value that begins the history of an edge that drifts says so") {
+  PushedValue unsampled{0, {}, Transform(), {}, 1};
+  unsampled.process_noise = *Covariance::from_stddev({1, 1, 1, 1, 1, 1});
+  unsampled.unsampled = true;
+  unsampled.drifts = true;
+  PushedValue sampled = unsampled;
+  sampled.unsampled = false;
+  sampled.stamp = Time(std::chrono::seconds(1));
+  PushedValue stays = sampled;
+  stays.drifts = false;
+  PushedValue cleared = unsampled;
+  cleared.unsampled = false;
+  cleared.cleared = true;
+  const auto arrived = from_wire(
+      travelled<StateType>(to_wire(PushedValues{1, {unsampled, sampled, stays, cleared}})));
+  REQUIRE(arrived);
+  const auto& entries = arrived->entries;
+  CHECK(entries[0].unsampled);
+  for (const std::size_t i : {1U, 2U, 3U}) CHECK_FALSE(entries[i].unsampled);
+  for (const std::size_t i : {0U, 1U, 3U}) CHECK(entries[i].drifts);
+  CHECK_FALSE(entries[2].drifts);
+  for (const PushedValue& one : entries) {
+    CHECK(one.process_noise->upper() == unsampled.process_noise->upper());
+  }
+}
+
 TEST_CASE("a reply whose unspecified edges belong to no value is rejected") {
   SegmentValues found;
   found.values = {{Pose(), StatedCovariance::unspecified()}};

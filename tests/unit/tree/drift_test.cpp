@@ -186,6 +186,40 @@ TEST_CASE("drift: what is seen between two samples corrects all later ones") {
   }
 }
 
+TEST_CASE("drift: a pose that comes late for the stamp of an observation is taken") {
+  Drifting robot;
+  Filter filter;
+  const Covariance R = of_deviations(0.005, 1);
+  robot.drive(0);
+  robot.drive(2);
+  REQUIRE(robot.see({shift(0.4), R}, at(1), "observed:1"));
+  const auto seen = robot.forest.lookup("base", "object", when(1)).value();
+  const auto later = robot.forest.lookup("world", "base", when(2)).value();
+  REQUIRE(robot.forest.update("base", Transform::exact(shift(0.35)), at(1)));
+  const auto twice = robot.forest.update("base", Transform::exact(shift(0.35)), at(1));
+  REQUIRE_FALSE(twice);
+  CHECK(twice.error().code == Errc::kStampTaken);
+  const auto same = [&](const char* a, const char* b, int step, const StampedTransform& before) {
+    const auto X = robot.forest.lookup(a, b, when(step)).value();
+    CHECK((X.pose.matrix() - before.pose.matrix()).norm() < 1e-12);
+    CHECK(X.covariance.of_specified().matrix().isApprox(before.covariance.of_specified().matrix()));
+  };
+  same("base", "object", 1, seen);
+  same("world", "base", 2, later);
+  // From there on it is on the way that was given.
+  const auto here = robot.forest.lookup("world", "base", when(1)).value();
+  const auto further =
+      robot.forest.lookup("world", "base", when(at(1) + std::chrono::milliseconds(50))).value();
+  CHECK(further.pose.translation().x() == Approx(here.pose.translation().x() - 0.175));
+  // What is seen later goes on from there.
+  robot.drive(3);
+  filter.drive(1);
+  filter.see(0.005 * 0.005);
+  filter.drive(2);
+  CHECK(robot.sigma("world", "base", 3) == Approx(std::sqrt(filter.base)).epsilon(0.01));
+  CHECK(robot.sigma("base", "object", 3) == Approx(filter.between()).epsilon(0.01));
+}
+
 TEST_CASE("drift: the object in the map and in the base is as certain as is right in 200 runs") {
   Random random(4301);
   INFO("seed " << random.seed());
