@@ -129,9 +129,9 @@ TEST_CASE("no answer comes before the push that tells of a rewritten past") {
   WatchedGroup group(7, request);
   const auto told = [&](bool is_answer) {
     std::vector<std::uint32_t> edges;
-    for (const PushedValue& one : group.snapshot(forest, {}, is_answer).value().entries) {
-      edges.push_back(one.index);
-    }
+    const auto all = group.snapshot(forest, {}, is_answer);
+    REQUIRE(all);
+    for (const PushedValue& one : all->entries) edges.push_back(one.index);
     std::sort(edges.begin(), edges.end());
     return edges;
   };
