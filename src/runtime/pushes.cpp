@@ -11,7 +11,7 @@ namespace tfdude {
 namespace {
 
 // How long a push of many values may take to arrive, if some of it must be repeated.
-constexpr Milliseconds kArrival{500};
+constexpr Milliseconds kArrival{1000};
 
 }  // namespace
 
@@ -76,7 +76,10 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
       edges_ += request.segments.size();
       if (watcher) ++watchers_[*watcher].groups;
     }
-    await_arrival(known->second);
+    if (known->second.arrives && sink_.now() >= *known->second.arrives) {
+      known->second.watched.arrived();
+      known->second.arrives.reset();
+    }
     snapshot = known->second.watched.snapshot(forest_, request.from, true);
     if (!snapshot) {
       end(known);
@@ -91,12 +94,10 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
 }
 
 void Pushes::await_arrival(Group& group) {
-  const auto now = sink_.now();
-  if (!group.watched.has_rewritten() || (group.arrives && now >= *group.arrives)) {
+  if (!group.watched.has_rewritten()) {
     group.watched.arrived();
-    group.arrives.reset();
   } else if (!group.arrives) {
-    group.arrives = now + kArrival;
+    group.arrives = sink_.now() + kArrival;
   }
 }
 

@@ -1,8 +1,11 @@
+// What owners and watchers do while the past of an edge is rewritten.
+
 #include "partition/rewrites.hpp"
 
 #include <algorithm>
 #include <vector>
 
+#include "partition/watching.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
@@ -113,6 +116,43 @@ TEST_CASE("a part that does not fit the others ends its rewrite") {
   CHECK_FALSE(*rewrites.add(kPeer, "odom", parts[1], kNow));
   CHECK_FALSE(*rewrites.add(kPeer, "odom", parts[0], kNow));
   CHECK(is_whole(**rewrites.add(kPeer, "odom", parts[2], kNow), 6));
+}
+
+TEST_CASE("no answer comes before the push that tells of a rewritten past") {
+  Forest forest;
+  REQUIRE(forest.add("map", "", {}));
+  REQUIRE(forest.add("odom", "map", along_x(0)));
+  REQUIRE(forest.add("camera", "map", along_x(0)));
+  REQUIRE(forest.update("odom", along_x(1), Time(1s)));
+  WatchRequest request;
+  request.segments = {{"map", "odom"}, {"map", "camera"}};
+  WatchedGroup group(7, request);
+  const auto told = [&](bool is_answer) {
+    std::vector<std::uint32_t> edges;
+    const auto all = group.snapshot(forest, {}, is_answer);
+    REQUIRE(all);
+    for (const PushedValue& one : all->entries) edges.push_back(one.index);
+    std::sort(edges.begin(), edges.end());
+    return edges;
+  };
+  using Edges = std::vector<std::uint32_t>;
+  group.begin(*group.snapshot(forest, {}));
+  REQUIRE(forest.update("odom", along_x(2), Time(2s)));
+  CHECK(group.next_push(forest).entries.size() == 2);
+  group.arrived();
+  CHECK(told(true) == Edges{0, 1});
+  REQUIRE(forest.rewrite("odom", {Time(2s), Time(3s)}, {{Time(2s), along_x(9)}}));
+  CHECK(told(true) == Edges{1});
+  CHECK(told(false) == Edges{1});
+  CHECK(group.next_push(forest).entries.size() ==
+        2);  // where the history before ends, and the next
+  CHECK(group.has_rewritten());
+  CHECK(told(true) == Edges{1});
+  // What is pushed keeps its order.
+  CHECK(told(false) == Edges{0, 1});
+  CHECK(group.snapshot(forest, {}, true)->commit < forest.newest_commit());
+  group.arrived();
+  CHECK(told(true) == Edges{0, 1});
 }
 
 }  // namespace
