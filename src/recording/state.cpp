@@ -299,9 +299,15 @@ std::vector<PartitionNews> State::news() const {
     }
     ValuesNews values;
     for (PushedValue& value : forest_.values_since(cursors, {true, {}, false, true}).values) {
-      values.values.push_back({places[value.index], value.stamp, value.X,
-                               std::move(value.correlation), value.process_noise, value.cleared,
-                               value.unsampled, value.drifts});
+      values.values.push_back({places[value.index],
+                               value.stamp,
+                               value.X,
+                               std::move(value.correlation),
+                               value.process_noise,
+                               value.cleared,
+                               value.unsampled,
+                               {},
+                               value.drifts});
     }
     all.push_back({name, std::move(values)});
   }
