@@ -92,7 +92,8 @@ struct ReviseRequest {
 };
 
 /// Some of the samples that are to replace those of the edge named by the request's id within an
-/// interval. Once all have come, in any order, the owner replaces them in one commit.
+/// interval. The part with the last samples is sent when all others have been answered; with it the
+/// owner replaces all of them in one commit, or answers kChangedMeanwhile if it has not all others.
 struct RewriteRequest {
   std::uint64_t number = 0;  ///< of the rewrite, among those of its sender
   TimeInterval interval;

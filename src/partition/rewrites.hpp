@@ -27,8 +27,9 @@ class Rewrites {
   static constexpr std::chrono::seconds kIdle{10};
 
   /// Keeps a part. A part that has come before changes nothing.
-  /// @return all samples, once they have come: the rewrite is over then. kTooMuch (too many
-  ///   samples, or rewrites), kInvalidInput (the part does not fit the others, which are dropped)
+  /// @return all samples, with the last part: the rewrite is over then. kChangedMeanwhile: it is
+  ///   the last one, but others are missing; kTooMuch (too many samples, or rewrites);
+  ///   kInvalidInput (the part does not fit the others). All but kTooMuch end the rewrite
   [[nodiscard]] Result<std::optional<std::vector<EdgeSample>>> add(const PeerId& from,
                                                                    const std::string& id,
                                                                    const RewriteRequest& part,
