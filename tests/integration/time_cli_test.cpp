@@ -149,7 +149,7 @@ TEST_CASE("time: histories and rates are shown with the rejected samples") {
   const json partitions = answered(d, {"partitions"});
   CHECK(partitions.at("partitions").at(0).at("samples") == 5);
   CHECK(partitions.at("partitions").at(0).at("history_bytes") > 1000);
-  CHECK_THAT(text(d, {"partitions"}), ContainsSubstring(" 5      1.1 KiB"));
+  CHECK_THAT(text(d, {"partitions"}), ContainsSubstring(" 5      1.2 KiB"));
 }
 
 TEST_CASE("time: a clock that jumps back restarts the history and the daemon logs it") {
