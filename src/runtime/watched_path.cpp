@@ -28,11 +28,6 @@ bool lacks_common(const Result<StampedTransform>& newest) {
   return !newest && newest.error().code == Errc::kTooOld;
 }
 
-// Whether the last transform may be returned for this query, once there is no newer one.
-bool wants_newest(const Query& query) {
-  return !query.at && !query.age_noise_until && query.order == Order::kSecond;
-}
-
 }  // namespace
 
 WatchedPath::WatchedPath(std::string a, std::string b, WatchOptions options,

@@ -126,6 +126,10 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] bool in_memory() const {
     return memory_.load(std::memory_order_acquire) != nullptr;
   }
+  /// Whether the last transform may be returned for this query, once there is no newer one.
+  [[nodiscard]] static bool wants_newest(const Query& query) {
+    return !query.at && !query.age_noise_until && query.order == Order::kSecond;
+  }
   /// What is found in the memory of the owners, or was there last.
   [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;
   /// The last transform, if nobody has read a later one.

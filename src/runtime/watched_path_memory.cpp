@@ -44,7 +44,7 @@ bool WatchedPath::read_memory(Clock::time_point now) {
 
 Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query& query) const {
   auto found = memory.lookup_kept(a_, b_, query);
-  if (query.at || query.age_noise_until || query.order != Order::kSecond) {
+  if (!wants_newest(query)) {
     if (!found) explain(memory, query, found.error());
     return found;
   }
