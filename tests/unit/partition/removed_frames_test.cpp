@@ -181,7 +181,7 @@ TEST_CASE("a removal is over once its partition returns to an owner that has the
   CHECK_FALSE(left_arm->yield());
   const auto conflicts = left_arm->conflicts();
   REQUIRE(conflicts.size() == (dropped ? 0 : 1));
-  if (!dropped) CHECK_THAT(conflicts.front(), Catch::Contains("'arm', which keeps it"));
+  if (!dropped) CHECK_THAT(conflicts.front(), testing::ContainsSubstring("'arm', which keeps it"));
   // For all, whatever becomes of arm.
   for (const Page& page : left_arm->partition.take_pages()) {
     for (const Tombstone& one : page.tombstones) CHECK(one.kind == Tombstone::Kind::kYielded);
