@@ -132,6 +132,8 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   }
   /// What is found in the memory of the owners, or was there last.
   [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;
+  /// Whether the memory of all owners of the route is known.
+  [[nodiscard]] bool reads_all(MemoryReads& memory) const;
   /// The last transform, if nobody has read a later one.
   [[nodiscard]] std::optional<StampedTransform> shown_before() const;
   void explain(const MemoryReads& memory, const Query& query, Error& why) const;

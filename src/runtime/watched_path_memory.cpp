@@ -1,5 +1,6 @@
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "runtime/memory_reads.hpp"
 #include "runtime/watched_path.hpp"
@@ -56,7 +57,10 @@ Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query
     // The structure here may be behind that in memory: then what was there before counts, which is
     // not older than what others have read.
     if (!found && is_rerouting(found.error())) found = memory.lookup_former(a_, b_);
-    if (found || is_rerouting(found.error())) continue;
+    if (found) continue;
+    // An owner returns as another process: nobody can read it until its memory is known here.
+    const bool rerouting = is_rerouting(found.error());
+    if (rerouting && reads_all(memory)) continue;
     if (found.error().code == Errc::kNotYet) break;
     // Its edges have no instant in common, perhaps because they are others now. If others have read
     // a later one since, they have.
@@ -72,6 +76,15 @@ Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query
   while (stamp > latest && !latest_read_.compare_exchange_weak(latest, stamp)) {
   }
   return found;
+}
+
+bool WatchedPath::reads_all(MemoryReads& memory) const {
+  std::vector<Part> parts;
+  {
+    const Lock lock(mutex_);
+    if (route_in_memory_) parts = route_in_memory_->parts;
+  }
+  return memory.can_watch(parts);
 }
 
 std::optional<StampedTransform> WatchedPath::shown_before() const {
