@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <chrono>
 
-#include "tfdude/math/belief.hpp"
 #include "tfdude/math/interpolate.hpp"
+
+#include "rendering/whole_value.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -13,15 +14,6 @@ constexpr std::chrono::seconds kKept{60};
 // Of all edges together: some 80 bytes each.
 constexpr std::size_t kMostSamples = 1'000'000;
 constexpr std::size_t kMostSamplesOfEdge = 2000;
-
-// With common errors. Their correlation between edges is left out.
-StatedCovariance whole(const WatchedValue& value) {
-  if (value.correlation.common_errors.empty()) return value.X_PC.covariance;
-  Belief X{value.X_PC.pose, value.X_PC.covariance.of_specified(), {}, {}};
-  X.common_errors = value.correlation.common_errors;
-  X.unspecified = !value.X_PC.covariance.complete();
-  return collapse(X).covariance;
-}
 
 Transform transform_of(const Pose& pose, const std::shared_ptr<const StatedCovariance>& sigma) {
   return {pose, sigma ? *sigma : StatedCovariance()};
@@ -102,7 +94,7 @@ void World::keep(ShownFrame& frame, const WatchedValue& value) {
     frame.past.erase(std::partition_point(frame.past.begin(), frame.past.end(), kept),
                      frame.past.end());
   }
-  const StatedCovariance sigma = whole(value);
+  const StatedCovariance sigma = whole(value).covariance;
   auto shared = frame.covariance && *frame.covariance == sigma
                     ? frame.covariance
                     : std::make_shared<const StatedCovariance>(sigma);

@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "tfdude/base/id.hpp"
-#include "tfdude/math/belief.hpp"
+
+#include "rendering/whole_value.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -20,17 +21,6 @@ Correlation replayed(Correlation correlation) {
     error.source = std::string(kReplayedPrefix) + error.source.substr(kObservedPrefix.size());
   }
   return correlation;
-}
-
-// A sample with its own correlation as one of which only that of its edge is known.
-Transform whole(const WatchedValue& value, const Correlation& of_edge) {
-  const auto& said = of_edge.common_errors;
-  Belief X{value.X_PC.pose, value.X_PC.covariance.of_specified(), {}, {}};
-  for (const CommonError& error : value.correlation.common_errors) {
-    if (std::count(said.begin(), said.end(), error) == 0) X.common_errors.push_back(error);
-  }
-  X.unspecified = !value.X_PC.covariance.complete();
-  return collapse(X);
 }
 
 // A process of an earlier version may have had an id that no new frame gets.
@@ -66,7 +56,7 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
     Edge edge{frame.parent, false, Correlation()};
     if (known[i] != nullptr) {
       const bool of_sample = known[i]->of_sample();
-      spec.X_PC = of_sample ? whole(*known[i], {}) : known[i]->X_PC;
+      spec.X_PC = of_sample ? whole(*known[i]) : known[i]->X_PC;
       if (!of_sample) spec.correlation = replayed(known[i]->correlation);
       edge.correlation = spec.correlation;
       const bool unsampled = known[i]->unsampled;
