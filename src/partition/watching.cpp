@@ -186,13 +186,15 @@ Result<PushedValues> WatchedGroup::all(const Forest& forest, std::optional<Time>
 }
 
 // The watchers have the history before one that a push is about to tell, perhaps as what goes on
-// from that. Whatever comes first would only tell them that theirs is over.
+// from that. Whatever comes first would only tell them that theirs is over. What is left may be
+// half of a commit, so it does not follow on anything that a watcher lacks. An edge without samples
+// has no past that could be lost.
 void WatchedGroup::leave_out_pending(PushedValues& pushed, bool on_its_way) const {
   if (request_.period > std::chrono::nanoseconds(0)) return;
   auto& entries = pushed.entries;
   const auto pending =
       std::remove_if(entries.begin(), entries.end(), [&](const PushedValue& entry) {
-        if (request_.composed) return false;
+        if (request_.composed || !(entry.stamp || entry.cleared)) return false;
         const std::uint64_t history = cursors_[entry.index].history;
         const bool is_rewritten =
             std::find(rewritten_.begin(), rewritten_.end(), entry.index) != rewritten_.end();
@@ -200,7 +202,7 @@ void WatchedGroup::leave_out_pending(PushedValues& pushed, bool on_its_way) cons
       });
   if (pending == entries.end()) return;
   entries.erase(pending, entries.end());
-  pushed.commit = arrived_commit_;
+  pushed.after = pushed.commit;
 }
 
 void WatchedGroup::note_rewritten(const std::vector<PushedValue>& values) {

@@ -84,10 +84,7 @@ class WatchedGroup {
   /// Whether a push has told of a past that was rewritten, which may not have arrived yet.
   [[nodiscard]] bool has_rewritten() const { return !rewritten_.empty(); }
   /// All pushes have arrived.
-  void arrived() {
-    rewritten_.clear();
-    arrived_commit_ = told_;
-  }
+  void arrived() { rewritten_.clear(); }
 
  private:
   [[nodiscard]] std::vector<EdgeCursor> fresh_cursors() const;
@@ -103,8 +100,7 @@ class WatchedGroup {
 
   std::uint64_t id_;
   WatchRequest request_;
-  std::uint64_t told_ = 0;            // commit of the last push
-  std::uint64_t arrived_commit_ = 0;  // of the last one that has arrived
+  std::uint64_t told_ = 0;  // commit of the last push
   // Edges whose past was rewritten, as a push says that has not.
   std::vector<std::uint32_t> rewritten_;
   // What the first watcher was told of composed segments.

@@ -150,9 +150,48 @@ TEST_CASE("no answer comes before the push that tells of a rewritten past") {
   CHECK(told(true) == Edges{1});
   // What is pushed keeps its order.
   CHECK(told(false) == Edges{0, 1});
-  CHECK(group.snapshot(forest, {}, true)->commit < forest.newest_commit());
+  CHECK(group.snapshot(forest, {}, true)->after == forest.newest_commit());
   group.arrived();
   CHECK(told(true) == Edges{0, 1});
+}
+
+// The push of the new value of a static edge was lost. An answer that leaves out what another push is
+// about to tell does not replace it.
+TEST_CASE("an answer that leaves an edge out follows on nothing that a watcher lacks") {
+  Forest forest;
+  REQUIRE(forest.add("map", "", {}));
+  REQUIRE(forest.add("odom", "map", along_x(0)));
+  REQUIRE(forest.add("arm", "map", along_x(0)));
+  REQUIRE(forest.add("tip", "arm", along_x(0)));
+  REQUIRE(forest.update("odom", along_x(1), Time(1s)));
+  WatchRequest request;
+  request.segments = {{"map", "odom"}, {"map", "arm"}, {"arm", "tip"}};
+  WatchedGroup group(7, request);
+  ReceivedGroup watcher(request.segments.size());
+  PushedValues first = *group.snapshot(forest, {}, true);
+  group.begin(first);
+  REQUIRE(watcher.place(first).follows_on);
+  PushedValues pushed = group.next_push(forest);
+  REQUIRE(watcher.place(pushed).is_old);
+  group.arrived();
+  REQUIRE(forest.update({{"arm", along_x(3)}, {"tip", along_x(-3)}}));
+  (void)group.next_push(forest);  // lost
+  group.arrived();
+
+  REQUIRE(forest.move("arm", "map", along_x(3)));
+  PushedValues moved = *group.snapshot(forest, {}, true);
+  CHECK(moved.entries.size() == 3);
+  REQUIRE(forest.rewrite("odom", {Time(1s), Time(2s)}, {{Time(1s), along_x(9)}}));
+  PushedValues less = *group.snapshot(forest, {}, true);
+  CHECK(less.entries.size() == 2);
+  CHECK_FALSE(watcher.place(less).follows_on);
+  CHECK(watcher.lacks());
+  PushedValues next = group.next_push(forest);
+  CHECK_FALSE(watcher.place(next).follows_on);
+  group.arrived();
+  PushedValues whole = *group.snapshot(forest, {}, true);
+  CHECK(watcher.place(whole).follows_on);
+  CHECK_FALSE(watcher.lacks());
 }
 
 }  // namespace
