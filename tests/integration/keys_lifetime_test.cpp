@@ -1,5 +1,6 @@
-// Keys that expire or are revoked while the programs that use them run.
+// Programs with keys whose peers die, and keys that expire or are revoked while they run.
 
+#include <csignal>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 #include "tfdude/client/client.hpp"
 
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/key_store.hpp"
 #include "support/test_domain.hpp"
 
@@ -56,6 +58,37 @@ struct SecuredPair {
 const std::string kHand = "frames: [{id: hand, parent: base, xyz: [1, 0, 0]}]\n";
 
 }  // namespace
+
+// Nobody but DDS can read the acknowledgements of encrypted messages, and DDS keeps the killed
+// process for 30 s.
+TEST_CASE("keys: neither a flush nor the end of a client waits for a process that was killed") {
+  SecuredPair robot;
+  robot.keys.add("arm", testing::daemon_of("arm"));
+  Roles roles = testing::streaming("arm");
+  roles.look = true;
+  robot.keys.add("controller", roles);
+  Process arm = robot.serve("arm", kHand);
+  std::optional<Client> client = robot.client("controller");
+  const auto publish = [&](double x) {
+    return client->publish({{"hand", testing::along_x(x)}}).has_value();
+  };
+  REQUIRE(eventually([&] { return publish(1); }));
+  REQUIRE(client->flush(20'000ms));
+  arm.signal(SIGKILL);
+  REQUIRE(eventually([&] { return !publish(2); }));
+  Process again = robot.serve("arm", kHand);
+  REQUIRE(eventually([&] { return publish(3); }));
+  using Clock = std::chrono::steady_clock;
+  const auto returned = Clock::now();
+  CHECK(client->flush(20'000ms));
+  CHECK(Clock::now() - returned < 10s);
+  CHECK(client->lookup("base", "hand").value().pose.translation().x() == 3);
+  REQUIRE(publish(4));
+  client.reset();
+  CHECK(Clock::now() - returned < 15s);
+  Client other = robot.client("eye");
+  CHECK(other.lookup("base", "hand").value().pose.translation().x() == 4);
+}
 
 TEST_CASE("keys: an owner whose keys expire keeps whom it has met, and meets nobody else") {
   SecuredPair robot;

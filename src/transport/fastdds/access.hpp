@@ -34,6 +34,9 @@ class Access {
     return keys_ ? keys_->authority_name.substr(keys_->authority_name.rfind(' ') + 1) : "";
   }
 
+  /// Whether all messages are encrypted, those of discovery excepted.
+  [[nodiscard]] bool encrypts() const { return keys_ && keys_->settings.encrypt; }
+
   [[nodiscard]] bool may_look() const { return !keys_ || keys_->roles.look; }
   [[nodiscard]] bool may_change(const std::string& partition) const {
     return !keys_ || keys_->roles.observe || keys_->roles.move.count(partition) > 0;

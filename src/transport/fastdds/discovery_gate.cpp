@@ -39,7 +39,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
                   std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs,
                   std::shared_ptr<Acknowledgements> acks,
                   std::shared_ptr<DatagramGuard> datagram_guard,
-                  std::shared_ptr<FairShare> fair_share)
+                  std::shared_ptr<FairShare> fair_share, std::shared_ptr<Farewells> of_others)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         client(of_client),
@@ -49,7 +49,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
         life_signs(std::move(signs)),
         acknowledgements(std::move(acks)),
         guard(std::move(datagram_guard)),
-        shares(std::move(fair_share)) {}
+        shares(std::move(fair_share)),
+        farewells(std::move(of_others)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
@@ -71,6 +72,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<Acknowledgements> acknowledgements;
   std::shared_ptr<DatagramGuard> guard;
   std::shared_ptr<FairShare> shares;
+  std::shared_ptr<Farewells> farewells;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -140,7 +142,12 @@ class GatedTransport final : public SendFilter {
               std::uint32_t size, const ertps::Locator_t& local, const ertps::Locator_t& remote,
               FairShare::Clock::time_point now) {
     if (!descriptor_.data_ports.contain(local.port)) {
-      return SendFilter::receive(next, bytes, size, local, remote);
+      SendFilter::receive(next, bytes, size, local, remote);
+      descriptor_.farewells->take([&](const Farewells::Datagram& farewell) {
+        const auto length = static_cast<std::uint32_t>(farewell.size());
+        SendFilter::receive(next, farewell.data(), length, local, remote);
+      });
+      return;
     }
     const FairShare::Sender sender = sender_at(remote);
     if (!descriptor_.shares->admits(sender, now)) return;
@@ -263,9 +270,9 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport =
-        std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering, gate_,
-                                          life_signs_, acknowledgements_, guard_, shares_);
+    transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
+                                                  gate_, life_signs_, acknowledgements_, guard_,
+                                                  shares_, farewells_);
   }
 }
 

@@ -9,6 +9,7 @@
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/datagram_guard.hpp"
 #include "transport/fastdds/fair_share.hpp"
+#include "transport/fastdds/farewells.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/life_signs.hpp"
 
@@ -41,16 +42,19 @@ class DiscoveryGate {
   /// @param life_signs, acknowledgements  are told of each of them
   /// @param guard  decides which of them Fast DDS has
   /// @param shares  and whether those with data would take too much of its time
+  /// @param farewells  are given to Fast DDS as if they had been received
   DiscoveryGate(
       std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
       std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>(),
       std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false),
-      std::shared_ptr<FairShare> shares = std::make_shared<FairShare>())
+      std::shared_ptr<FairShare> shares = std::make_shared<FairShare>(),
+      std::shared_ptr<Farewells> farewells = std::make_shared<Farewells>())
       : gate_(std::move(gate)),
         life_signs_(std::move(life_signs)),
         acknowledgements_(std::move(acknowledgements)),
         guard_(std::move(guard)),
-        shares_(std::move(shares)) {}
+        shares_(std::move(shares)),
+        farewells_(std::move(farewells)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -73,6 +77,7 @@ class DiscoveryGate {
   const std::shared_ptr<Acknowledgements> acknowledgements_;
   const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<FairShare> shares_;
+  const std::shared_ptr<Farewells> farewells_;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

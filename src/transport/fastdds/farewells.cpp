@@ -8,10 +8,10 @@ namespace {
 
 // RTPS 2.2, sections 9.4.4, 9.4.5.3 and 9.6.3. All numbers have the least byte first.
 constexpr std::array<std::uint8_t, 8> kProtocol{'R', 'T', 'P', 'S', 2, 3, 1, 15};
-// DATA with inline QoS and without payload; length; flags; octets to the inline QoS; reader, writer.
-constexpr std::array<std::uint8_t, 16> kData{0x15, 0x03, 56, 0, 0,    0, 16,   0,
-                                             0,    0,    1,  0, 0xc7, 0, 0x01, 0x00};
-constexpr std::array<std::uint8_t, 2> kWriterEnd{0, 0xc2};
+// DATA with inline QoS, without payload; its length; flags; octets to the inline QoS; the reader,
+// and the writer, which a participant uses to announce itself.
+constexpr std::array<std::uint8_t, 16> kData{0x15, 0x03, 52, 0,    0, 0,    16, 0,
+                                             0,    0x01, 0,  0xc7, 0, 0x01, 0,  0xc2};
 // Beyond all numbers of its announcements.
 constexpr std::array<std::uint8_t, 8> kNumber{0xff, 0xff, 0xff, 0x7f, 0, 0, 0, 0};
 constexpr std::array<std::uint8_t, 4> kKeyHash{0x70, 0, 16, 0};
@@ -28,7 +28,6 @@ Farewells::Datagram Farewells::farewell_of(const PeerId& peer) {
   put(kProtocol);
   put(peer);
   put(kData);
-  put(kWriterEnd);
   put(kNumber);
   put(kKeyHash);
   put(peer);

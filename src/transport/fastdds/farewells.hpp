@@ -19,7 +19,7 @@ class Farewells {
  public:
   /// What a participant would send: a header, and DATA of its announcements that disposes of it
   /// (RTPS 2.2, sections 8.5.3.3 and 9.6.3.9). It is not protected, with keys neither.
-  using Datagram = std::array<std::uint8_t, 80>;
+  using Datagram = std::array<std::uint8_t, 76>;
 
   [[nodiscard]] static Datagram farewell_of(const PeerId& peer);
 
@@ -27,8 +27,8 @@ class Farewells {
   /// every 300 ms.
   void say_for(const PeerId& peer);
 
-  /// Calls say(datagram) for each participant for which it was not said yet. An atomic load if there
-  /// is none.
+  /// Calls say(datagram) for each participant for which it was not said yet. An atomic load if
+  /// there is none.
   template <class Say>
   void take(const Say& say) {
     if (!any_.load(std::memory_order_relaxed)) return;

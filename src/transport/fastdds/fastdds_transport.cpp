@@ -117,7 +117,7 @@ void FastDdsTransport::take_times(edds::DomainParticipantQos& qos) {
 Result<void> FastDdsTransport::create_endpoints() {
   using Info = edds::SampleInfo;
   senders_.emplace(Senders::Parts{context(), topics_, peers_, attention_, access_, reply_paths_,
-                                  *acknowledgements_, options_.domain});
+                                  *acknowledgements_, *farewells_, options_.domain});
   contact_.emplace(peers_, attention_, *senders_, !announced_by_dds_);
   push_channels_.emplace(
       context(), *topics_.state, options_.partition,

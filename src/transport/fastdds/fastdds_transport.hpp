@@ -133,7 +133,9 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<Acknowledgements> acknowledgements_ = std::make_shared<Acknowledgements>();
   const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<FairShare> fair_share_ = std::make_shared<FairShare>();
-  DiscoveryGate discovery_gate_{gate_, life_signs_, acknowledgements_, guard_, fair_share_};
+  const std::shared_ptr<Farewells> farewells_ = std::make_shared<Farewells>();
+  DiscoveryGate discovery_gate_{gate_,  life_signs_, acknowledgements_,
+                                guard_, fair_share_, farewells_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);

@@ -130,7 +130,12 @@ Result<void> Senders::flush(Deadline deadline) {
 // Checks the owner repeatedly, because it may be lost, or return, meanwhile.
 Result<void> Senders::flush(Writer& stream, const std::string& partition, Deadline deadline) {
   const Writer::Mark mark = stream.mark();  // what is written meanwhile is left to the next flush
-  const auto gone = [this](const PeerId& peer) { return parts_.peers.replaced(peer); };
+  const auto gone = [this](const PeerId& peer) {
+    const bool replaced = parts_.peers.replaced(peer);
+    // Acknowledgements cannot be read then, so Fast DDS must wait for the others only.
+    if (replaced && parts_.access.encrypts()) parts_.farewells.say_for(peer);
+    return replaced;
+  };
   while (true) {
     // A silent peer is not waited for; what it has acknowledged before still counts.
     const bool silent = parts_.peers.silent(partition);

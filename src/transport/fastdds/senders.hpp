@@ -11,6 +11,7 @@
 #include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/attention.hpp"
 #include "transport/fastdds/entities.hpp"
+#include "transport/fastdds/farewells.hpp"
 #include "transport/fastdds/peers.hpp"
 #include "transport/fastdds/reply_paths.hpp"
 #include "transport/fastdds/topics.hpp"
@@ -33,6 +34,7 @@ class Senders {
     const Access& access;
     const ReplyPaths& reply_paths;
     Acknowledgements& acknowledgements;
+    Farewells& farewells;
     std::uint32_t domain;  // for messages
   };
 

@@ -155,8 +155,8 @@ TEST_CASE("no answer comes before the push that tells of a rewritten past") {
   CHECK(told(true) == Edges{0, 1});
 }
 
-// The push of the new value of a static edge was lost. An answer that leaves out what another push is
-// about to tell does not replace it.
+// The push of the new value of a static edge was lost. An answer that leaves out what another push
+// is about to tell does not replace it.
 TEST_CASE("an answer that leaves an edge out follows on nothing that a watcher lacks") {
   Forest forest;
   REQUIRE(forest.add("map", "", {}));

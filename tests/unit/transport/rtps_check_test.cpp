@@ -1,5 +1,6 @@
 #include "transport/fastdds/rtps_check.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -10,6 +11,7 @@
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/rtps_bytes.hpp"
+#include "transport/fastdds/farewells.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -303,6 +305,16 @@ TEST_CASE("datagrams: any bytes are read within their end") {
     }
     CHECK((flaw == Flaw::kNone) == std::string(to_string(flaw)).empty());
   }
+}
+
+TEST_CASE("rtps check: a farewell is what its participant would send") {
+  const Farewells::Datagram said = Farewells::farewell_of(kSender);
+  const Bytes farewell(said.begin(), said.end());
+  CHECK(flaw_of(farewell) == Flaw::kNone);
+  CHECK(flaw_of(farewell, true) == Flaw::kNone);
+  CHECK(std::equal(kSender.begin(), kSender.end(), farewell.begin() + 8));
+  // The length of its one submessage.
+  CHECK(farewell.size() == 20U + 4U + farewell[22]);
 }
 
 }  // namespace tfdude::fastdds
