@@ -204,13 +204,19 @@ bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, con
   if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
   if (entry.cleared && is_old) return false;
   if (!is_late) return true;
-  if (!message.reply) return period_.count() == 0;
-  if (!missing_from_) return false;
+  if (message.reply ? !missing_from_ : period_.count() != 0) return false;
+  if (known.told.empty()) return true;
   const Known::Told one{*entry.stamp, hash_of(entry.X)};
   return !std::binary_search(known.told.begin(), known.told.end(), one);
 }
 
+bool WatchedPartition::is_pushed_twice() const {
+  return std::any_of(groups_.begin(), groups_.end(),
+                     [](const Group& group) { return group.outdated; });
+}
+
 void WatchedPartition::forget_told() {
+  if (is_pushed_twice()) return;
   for (Known& known : known_) {
     auto& told = known.told;
     const auto kept =
@@ -242,7 +248,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
     known.correlation = entry.correlation;
   }
   if (begins || entry.cleared) known.told.clear();
-  if (missing_from_ && entry.stamp) {
+  if (entry.stamp && (missing_from_ || is_pushed_twice())) {
     const Known::Told one{*entry.stamp, hash_of(entry.X)};
     known.told.insert(std::upper_bound(known.told.begin(), known.told.end(), one), one);
   }
@@ -340,6 +346,7 @@ std::set<std::uint64_t> WatchedPartition::groups(Clock::time_point now) {
     groups_.erase(std::remove_if(groups_.begin(), groups_.end(),
                                  [](const Group& group) { return group.outdated; }),
                   groups_.end());
+    forget_told();
   }
   std::set<std::uint64_t> groups;
   for (const Group& group : groups_) groups.insert(group.id);

@@ -74,7 +74,7 @@ class WatchedPartition final : public Watched {
     bool cleared = false;
     bool unsampled = false;
     using Told = std::pair<Time, std::size_t>;  // a stamp, and the hash of its value
-    std::vector<Told> told;                     // while an answer may bring it again; sorted
+    std::vector<Told> told;                     // while it may come again; sorted
   };
   struct PlannedGroup {
     std::uint64_t id = 0;
@@ -101,7 +101,10 @@ class WatchedPartition final : public Watched {
   [[nodiscard]] std::vector<Watched::Group> group();
   /// The owner is reachable and has the planned frames. @return whether they or the groups are new
   [[nodiscard]] bool take_over();
-  /// Drops from what was told what no answer brings again.
+  /// Whether groups of the plan before are still pushed, too: each message of them may have several
+  /// samples that were told.
+  [[nodiscard]] bool is_pushed_twice() const TFDUDE_REQUIRES(mutex_);
+  /// Drops from what was told what does not come again.
   void forget_told() TFDUDE_REQUIRES(mutex_);
   /// Whether a value of the known history is news.
   [[nodiscard]] bool is_news(const PushedValue& entry, const Known& known, const Message& message,

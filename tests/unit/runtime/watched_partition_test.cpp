@@ -1,0 +1,106 @@
+#include "runtime/watched_partition.hpp"
+
+#include <chrono>
+#include <mutex>
+#include <vector>
+
+#include "base/loop.hpp"
+#include "partition/directory.hpp"
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/process.hpp"
+#include "tree/forest.hpp"
+
+namespace tfdude {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::along_x;
+using testing::eventually;
+
+long ms(Time time) { return static_cast<long>(nanoseconds(time) / 1'000'000); }
+
+// An owner, and a watch of its partition in the same process.
+struct WatchedOwner {
+  WatchedOwner() {
+    REQUIRE(forest.add("base", "", {}));
+    REQUIRE(forest.add("arm", "base", along_x(0)));
+    REQUIRE(forest.update("arm", along_x(0), Time(1s)));
+  }
+  // A round of the watch, and the owner's side of the group that it asks for.
+  WatchedGroup plan() {
+    REQUIRE(watch.plan({forest, directory, 1}));
+    const Watched::Plan plan = watch.adopt(now);
+    REQUIRE(plan.groups.size() == 1);
+    return {plan.groups[0].id, std::get<WatchRequest>(plan.groups[0].part.request.body)};
+  }
+  void answer(WatchedGroup& group) {
+    const PushedValues all = group.snapshot(forest, watch.lacks_from(), true).value();
+    group.begin(all);
+    (void)watch.take(all, now);
+  }
+  // [ms]
+  std::vector<long> told() {
+    const std::lock_guard lock(mutex);
+    return stamps;
+  }
+
+  Forest forest;
+  Directory directory{forest, "arm"};
+  Watched::Clock::time_point now{1h};
+  std::mutex mutex;
+  std::vector<long> stamps;
+  Loop loop{"test"};
+  Callbacks callbacks{loop};
+  WatchedPartition watch{"arm", 0,
+                         [this](const PartitionNews& news) {
+                           const auto* values = std::get_if<ValuesNews>(&news.what);
+                           if (values == nullptr) return;
+                           const std::lock_guard lock(mutex);
+                           for (const WatchedValue& value : values->values) {
+                             if (value.stamp) stamps.push_back(ms(*value.stamp));
+                           }
+                         },
+                         callbacks.line()};
+};
+
+// While the frames change, the groups before and after are both pushed. If the machine is busy, a
+// message has several samples.
+TEST_CASE("watched partition: samples that two groups push are told once") {
+  WatchedOwner owner;
+  WatchedGroup before = owner.plan();
+  owner.answer(before);
+  (void)owner.watch.take(before.next_push(owner.forest), owner.now);
+  REQUIRE(owner.forest.add("lamp", "arm", along_x(1)));
+  WatchedGroup after = owner.plan();
+  owner.answer(after);
+  const bool settled = GENERATE(false, true);
+  if (settled) owner.now += WatchedPartition::kSettle + 100ms;
+  (void)owner.watch.groups(owner.now);
+  std::vector<long> written{1000};
+  const auto write = [&] {
+    for (int i = 0; i < 3; ++i) {
+      written.push_back(written.back() + 10);
+      REQUIRE(owner.forest.update("arm", along_x(i), Time(Milliseconds(written.back()))));
+    }
+    const bool turned = GENERATE(false, true);
+    WatchedGroup& first = turned ? after : before;
+    WatchedGroup& second = turned ? before : after;
+    (void)owner.watch.take(first.next_push(owner.forest), owner.now);
+    (void)owner.watch.take(second.next_push(owner.forest), owner.now);
+  };
+  write();
+  write();
+  CHECK(eventually([&] { return owner.told().size() >= written.size(); }));
+  // Only late ones are left to the group after.
+  owner.now += WatchedPartition::kKeepBefore + WatchedPartition::kSettle;
+  (void)owner.watch.groups(owner.now);
+  REQUIRE(owner.forest.update("arm", along_x(9), Time(1s) + 5ms));
+  (void)owner.watch.take(after.next_push(owner.forest), owner.now);
+  written.push_back(1005);
+  CHECK(eventually([&] { return owner.told().size() >= written.size(); }));
+  CHECK(owner.told() == written);
+}
+
+}  // namespace
+}  // namespace tfdude
