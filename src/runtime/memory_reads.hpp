@@ -41,7 +41,7 @@ class MemoryReads {
     /// The memory of an owner can be read from now on.
     std::function<void()> attached;
     /// Owners have committed something. @return when to call again, unless they have before
-    std::function<Loop::Clock::time_point()> committed;
+    Loop::Job::Run committed;
   };
 
   MemoryReads(const Context& context, ProcessMemory& memory, Watchers watchers);

@@ -3,11 +3,11 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <thread>
 
+#include "base/loop.hpp"
 #include "base/mutex.hpp"
 #include "memory/port.hpp"
 #include "partition/directory.hpp"
@@ -27,8 +27,7 @@ class MemoryWaits {
 
   /// @param on_commits  called by the thread, soon after any of them has committed. @return when to
   ///   call it again, unless there are commits before
-  explicit MemoryWaits(std::function<Clock::time_point()> on_commits)
-      : on_commits_(std::move(on_commits)) {}
+  explicit MemoryWaits(Loop::Job::Run on_commits) : on_commits_(std::move(on_commits)) {}
   ~MemoryWaits() { stop(); }
   MemoryWaits(const MemoryWaits&) = delete;
   MemoryWaits& operator=(const MemoryWaits&) = delete;
@@ -49,7 +48,7 @@ class MemoryWaits {
   void run();
   void note_change() TFDUDE_REQUIRES(mutex_);
 
-  const std::function<Clock::time_point()> on_commits_;
+  const Loop::Job::Run on_commits_;
   std::atomic<std::uint64_t> changes_{0};  // of what is waited for
   Mutex mutex_{LockRank::kParts};
   std::shared_ptr<const Owners> owners_ TFDUDE_GUARDED_BY(mutex_) =
