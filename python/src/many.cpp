@@ -383,9 +383,13 @@ std::vector<Time> to_instants(py::handle at) {
   return instants;
 }
 
-std::vector<std::optional<Time>> to_stamps(py::handle at, bool& many) {
-  many = py::isinstance<py::sequence>(at) ||
+bool is_many(py::handle at) {
+  return py::isinstance<py::sequence>(at) ||
          (py::isinstance<py::array>(at) && py::reinterpret_borrow<py::array>(at).ndim() > 0);
+}
+
+std::vector<std::optional<Time>> to_stamps(py::handle at, bool& many) {
+  many = is_many(at);
   if (!many) return {to_stamp(at, "at")};
   std::vector<std::optional<Time>> stamps;
   if (const auto instants = of_array(at)) {

@@ -12,6 +12,8 @@ namespace tfdude::python {
 
 namespace py = pybind11;
 
+/// Whether it is a sequence or an array, of instants.
+[[nodiscard]] bool is_many(py::handle at);
 /// Many instants: int64 or float64 arrays (ns, s), datetime64, or a sequence of instants.
 [[nodiscard]] std::vector<Time> to_instants(py::handle at);
 /// The same, but also None, or a single one. @param many  whether it was several

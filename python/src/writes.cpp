@@ -2,6 +2,8 @@
 
 #include <pybind11/stl.h>
 
+#include "tfdude/client/broadcast.hpp"
+
 #include "arrays.hpp"
 #include "batches.hpp"
 #include "bind.hpp"
@@ -151,11 +153,17 @@ void bind_many(ClientClass& cls) {
       [](const Session& session, const Names& ids, py::handle poses, py::handle covariances,
          py::handle stamp) {
         const std::vector<EdgeUpdate> edges = edges_of(ids, poses, covariances);
-        const std::optional<Time> time = to_stamp(stamp, "stamp");
-        check(session.call([&](Client& c) { return c.publish(edges, time); }));
+        if (!is_many(stamp)) {
+          const std::optional<Time> time = to_stamp(stamp, "stamp");
+          return check(session.call([&](Client& c) { return c.publish(edges, time); }));
+        }
+        const std::vector<Time> stamps = to_instants(stamp);
+        check(session.call([&](Client& c) { return tfdude::publish(c, edges, stamps); }));
       },
       py::arg("ids"), py::arg("poses"), py::arg("covariances") = py::none(),
-      py::arg("stamp") = py::none(), "As update_many(), without acknowledgement.");
+      py::arg("stamp") = py::none(),
+      "As update_many(), without acknowledgement.\n\n"
+      "stamp: of all, or one for each; those of one stamp are one commit of each owner.");
 }
 
 /// The interval of a rewrite: (first, last), or that of the samples.

@@ -113,6 +113,20 @@ def test_lookup_many_instants(client, node):
         client.lookup_many([("lower", "tool")] * 2, [START] * 3)
 
 
+def test_publish_with_a_stamp_for_each(client, node):
+    rows = np.zeros((3, 7))
+    rows[:, 2], rows[:, 6] = [3, 5, 1], 1
+    stamps = np.array([START + 2000, START + 1000, START])
+    client.publish(["tool", "lower", "tool"], rows, "exact", stamps)
+    client.flush()
+    assert client.lookup("lower", "tool", START + 1000).translation[2] == 2
+    client.publish(["tool"], rows[:1], "exact", [START + 3000])
+    client.flush()
+    assert client.lookup("lower", "tool", START + 3000).translation[2] == 3
+    with pytest.raises(tfdude.InvalidArgumentException, match="2 stamps for 1 edges"):
+        client.publish(["tool"], rows[:1], "exact", stamps[:2])
+
+
 def test_joints(network, robot):
     names = [f"joint{i}" for i in range(30)]
     positions = np.linspace(-1, 1, 60)[::2]

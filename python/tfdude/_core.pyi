@@ -590,7 +590,11 @@ class Client:
         self, ids: Sequence[str], poses: _Poses, covariances: _Covariance = None, stamp: _Instant | None = None
     ) -> None: ...
     def publish(
-        self, ids: Sequence[str], poses: _Poses, covariances: _Covariance = None, stamp: _Instant | None = None
+        self,
+        ids: Sequence[str],
+        poses: _Poses,
+        covariances: _Covariance = None,
+        stamp: _Instant | npt.ArrayLike | Iterable[_Instant] | None = None,
     ) -> None: ...
     def rewrite(
         self,

@@ -105,6 +105,39 @@ TEST_CASE("broadcast: a frame is created, updated and moved, as a broadcaster of
   CHECK(ensure(*client, "cup", "moon", ahead(1)).error().code == Errc::kUnknownParent);
 }
 
+TEST_CASE("broadcast: each value of a list may have its own stamp") {
+  const auto join = testing::join_loopback();
+  auto node = Node::open(join("robot"), "robot", {{"world", "", {}}});
+  auto client = Client::open(join(""));
+  REQUIRE((node && client));
+  const auto at = [](double x) {
+    return Transform::exact(Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}));
+  };
+  REQUIRE(client->add("left", "world", at(0)));
+  REQUIRE(client->add("right", "world", at(0)));
+  const Time begin(std::chrono::seconds(1'000'000));
+  const auto x_of = [&](const char* frame, Time when) {
+    Query query;
+    query.at = when;
+    return client->lookup("world", frame, query).value().pose.translation().x();
+  };
+  // The later one of an edge may come first in the list.
+  REQUIRE(publish(*client, {{"left", at(3)}, {"right", at(5)}, {"left", at(1)}},
+                  {begin + Milliseconds(20), begin + Milliseconds(10), begin}));
+  CHECK(x_of("left", begin + Milliseconds(10)) == 2);
+  CHECK(x_of("right", begin + Milliseconds(10)) == 5);
+  Query early;
+  early.at = begin;
+  CHECK(client->lookup("world", "right", early).error().code == Errc::kTooOld);
+  // What is wrong does not stop the others.
+  const auto some = publish(*client, {{"nobody", at(0)}, {"left", at(7)}},
+                            {begin + Milliseconds(30), begin + Milliseconds(40)});
+  CHECK(some.error().code == Errc::kUnknownFrame);
+  CHECK(x_of("left", begin + Milliseconds(40)) == 7);
+  CHECK(publish(*client, {{"left", at(9)}}, {}).error().message == "0 stamps for 1 edges");
+  CHECK(x_of("left", begin + Milliseconds(40)) == 7);
+}
+
 TEST_CASE("conversions: Eigen's transforms, angles, and Jacobians beside differences") {
   Random random(4621);
   INFO("seed " << random.seed());

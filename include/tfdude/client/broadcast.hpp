@@ -1,7 +1,10 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "tfdude/client/client.hpp"
 
@@ -38,6 +41,27 @@ namespace tfdude {
     if (attempt < 2) done = {};
   }
   return done;
+}
+
+/// Streams values of which each has its own stamp, as a list of transforms that a broadcaster of
+/// tf2 sends. Those of one stamp are one commit of each owner; the earliest are sent first.
+/// @param stamps  one for each edge
+/// @return as Client::publish(): the first error, all others are sent; kInvalidInput, and nothing
+///   is sent: there are not as many stamps as edges
+[[nodiscard]] inline Result<void> publish(Client& client, const std::vector<EdgeUpdate>& edges,
+                                          const std::vector<Time>& stamps) {
+  if (stamps.size() != edges.size()) {
+    return tl::unexpected(Error{
+        Errc::kInvalidInput,
+        std::to_string(stamps.size()) + " stamps for " + std::to_string(edges.size()) + " edges"});
+  }
+  std::map<Time, std::vector<EdgeUpdate>> by_stamp;
+  for (std::size_t i = 0; i < edges.size(); ++i) by_stamp[stamps[i]].push_back(edges[i]);
+  Result<void> outcome;
+  for (const auto& [stamp, share] : by_stamp) {
+    if (auto sent = client.publish(share, stamp); !sent && outcome) outcome = std::move(sent);
+  }
+  return outcome;
 }
 
 }  // namespace tfdude
