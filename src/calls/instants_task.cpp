@@ -3,6 +3,8 @@
 #include <iterator>
 #include <utility>
 
+#include "partition/assembly.hpp"
+
 namespace tfdude {
 namespace {
 

@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/assembly.hpp"
+
 namespace tfdude {
 namespace {
 

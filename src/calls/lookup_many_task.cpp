@@ -5,6 +5,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/assembly.hpp"
+
 namespace tfdude {
 namespace {
 

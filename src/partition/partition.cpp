@@ -124,7 +124,7 @@ Reply Partition::answer_new(const PeerId& peer, const Request& request, Time now
   Reply reply;
   reply.sequence = request.sequence;
   if (const auto* asked = std::get_if<ConsistencyRequest>(&request.body)) {
-    reply.body = consistency(request.id, asked->all);
+    reply.body = consistency_.list(request.id, asked->all);
     return reply;
   }
   if (std::holds_alternative<JointsRequest>(request.body)) {
@@ -236,7 +236,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
   if (auto moved = forest_.move(id, request.parent, request.X_PC, lamport_time); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
-  consistency_.erase(id);
+  consistency_.forget(id);
   detach_joint(id);
   pages_.put(id, request.parent, lamport_time);
   pages_.close_epoch();
@@ -262,7 +262,7 @@ void Partition::leave(const Tombstone& tombstone) {
 void Partition::forget(const std::vector<std::string>& removed, LamportTime when) {
   if (removed.empty()) return;
   for (auto id = removed.rbegin(); id != removed.rend(); ++id) {
-    consistency_.erase(*id);
+    consistency_.forget(*id);
     detach_joint(*id);
     pages_.erase(*id);
     leave({*id, when, Tombstone::Kind::kRemoved, {}});
@@ -310,14 +310,7 @@ Result<void> Partition::revise(const ReviseRequest& request) {
   }
   for (const ReviseRequest::Edge& edge : request.edges) {
     if (edge.revision) values_asked_ = true;
-    if (!(edge.innovation.expected > 0)) continue;
-    EdgeConsistency& so_far = consistency_[edge.id];
-    so_far.id = edge.id;
-    ++so_far.observations;
-    so_far.refused += edge.refused ? 1 : 0;
-    so_far.sum.squares += edge.innovation.squares;
-    so_far.sum.expected += edge.innovation.expected;
-    so_far.sum.variance += edge.innovation.variance;
+    consistency_.note(edge);
   }
   return {};
 }
@@ -380,14 +373,6 @@ Result<void> Partition::set_joints(const JointUpdate& update) {
   }
   values_asked_ = true;
   return {};
-}
-
-std::vector<EdgeConsistency> Partition::consistency(const std::string& id, bool all) const {
-  std::vector<EdgeConsistency> found;
-  for (const auto& [edge, one] : consistency_) {
-    if ((all || edge == id) && found.size() < kMaxItems) found.push_back(one);
-  }
-  return found;
 }
 
 std::size_t Partition::apply(const Update& update) {

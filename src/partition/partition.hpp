@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "tfdude/base/time.hpp"
 
+#include "partition/consistency.hpp"
 #include "partition/directory.hpp"
 #include "partition/joints.hpp"
 #include "partition/messages.hpp"
@@ -148,7 +148,6 @@ class Partition {
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time);
   void attach_joints(const std::vector<FrameSpec>& frames, const std::vector<StoredJoint>& left);
   void detach_joint(const std::string& id);
-  [[nodiscard]] std::vector<EdgeConsistency> consistency(const std::string& id, bool all) const;
   bool yield(const PendingYield& pending, Time now);
   [[nodiscard]] bool hang_again(const StoredFrame& frame);
   void make_root(const StoredFrame& frame, Time now);
@@ -176,7 +175,7 @@ class Partition {
   Rewrites rewrites_;
   std::size_t max_frames_ = SIZE_MAX;
   std::uint64_t refused_frames_ = 0;
-  std::map<std::string, EdgeConsistency> consistency_;  // of observed edges
+  Consistency consistency_;
   bool saved_ = false;
   bool values_asked_ = false;       // a request waits until its values are saved
   std::uint64_t saved_commit_ = 0;  // up to which the values are

@@ -4,6 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/assembly.hpp"
 #include "partition/routing.hpp"
 
 namespace tfdude::recording {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "partition/assembly.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/replica.hpp"
