@@ -41,8 +41,10 @@ auto value_after_wait(const Session& session, Milliseconds wait, Call call, MayH
 /// The value of a call that waits for a frame or a partition.
 template <class Call>
 auto after_wait(const Session& session, py::handle timeout, Call call) {
-  return value_of(value_after_wait(session, to_milliseconds(timeout, "timeout"), call,
-                                   [](const Error& error) { return is_unknown(error.code); }));
+  return value_of(
+      value_after_wait(session, to_milliseconds(timeout, "timeout"), call, [](const Error& error) {
+        return is_unknown(error.code) || error.code == Errc::kUnreachable;
+      }));
 }
 
 }  // namespace tfdude::python

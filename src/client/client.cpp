@@ -16,9 +16,15 @@ Result<StampedTransform> look_up(Lookups& lookups, std::string_view a, std::stri
   return lookups.lookup(a, b, query);
 }
 
-// A call that follows has the right error if it does not come.
-void await_frame(Lookups& lookups, const std::string& id, const Deadline& deadline) {
-  if (!deadline.over()) (void)lookups.wait(id, id, {}, deadline.left());
+// A call that follows has the right error if it does not come, or nobody who owns it.
+void await_frame(Participant& participant, const std::string& id, const Deadline& deadline) {
+  if (deadline.over()) return;
+  (void)participant.lookups().wait(id, id, {}, deadline.left());
+  const auto info = participant.queries().info(id, deadline);
+  const auto path =
+      info ? participant.queries().path(info->parent, id) : Result<std::vector<PathSegment>>();
+  if (!path || path->empty()) return;
+  participant.discovery().wait_for_partition(path->front().partition, deadline);
 }
 
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
@@ -323,7 +329,7 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
 Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
                                        const WatchOptions& options, Milliseconds wait) {
   const Deadline deadline(wait);
-  for (const std::string& id : ids) await_frame(participant_->lookups(), id, deadline);
+  for (const std::string& id : ids) await_frame(*participant_, id, deadline);
   return participant_->watches().watch_edges(ids, options).map([](auto edges) {
     return EdgesWatch(edges);
   });
@@ -395,7 +401,7 @@ Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& part
 }
 
 Result<std::vector<HistoryInfo>> Client::history(const std::string& id, Milliseconds wait) {
-  await_frame(participant_->lookups(), id, Deadline(wait));
+  await_frame(*participant_, id, Deadline(wait));
   return participant_->queries().history(id);
 }
 

@@ -131,6 +131,14 @@ Result<void> collect(const FramesRequest& request, Collection& found) {
 
 }  // namespace
 
+void merge(std::vector<KnownFrame>& answer, std::vector<KnownFrame>&& other) {
+  std::unordered_set<std::string> there;
+  for (const KnownFrame& frame : answer) there.insert(frame.id);
+  for (KnownFrame& frame : other) {
+    if (there.insert(frame.id).second) answer.push_back(std::move(frame));
+  }
+}
+
 Result<std::vector<KnownFrame>> known_frames(const Forest& forest, const Directory& directory,
                                              const FramesRequest& request) {
   for (const SeenEpoch& seen : request.seen) {

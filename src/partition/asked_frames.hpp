@@ -49,6 +49,9 @@ class AskedFrames {
   std::unordered_map<std::string, Steady> as_of_;  // when a frame was requested last
 };
 
+/// Adds to an answer the frames of another one that it does not have, each after its parent.
+void merge(std::vector<KnownFrame>& answer, std::vector<KnownFrame>&& other);
+
 /// The answer of a participant that knows all frames. O(answer), plus O(frames) for a prefix. Call
 /// it while the structure does not change.
 /// @return kNotYet, if a change that the request names has not arrived; kTooMuch

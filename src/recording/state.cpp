@@ -199,7 +199,11 @@ std::optional<Lost> State::lost(const std::vector<FrameInfo>& edges) const {
     const auto& [name, known] = *found;
     const std::string why =
         known.why.empty() ? "partition " + quote(name) + " is not reachable" : known.why;
-    return Lost{name, known.incarnation, {Errc::kUnreachable, why}};
+    Lost lost{name, known.incarnation, {Errc::kUnreachable, why}, {}};
+    for (const FrameInfo& one : edges) {
+      if (owner(one.id) == name) lost.frames.push_back(one.id);
+    }
+    return lost;
   }
   return std::nullopt;
 }
@@ -210,6 +214,11 @@ std::optional<Lost> State::lost(std::string_view a, std::string_view b) const {
 }
 
 Returned State::returned(const Lost& lost, Time now) const {
+  const auto is_taken = [&](const std::string& frame) {
+    const std::string taker = owner(frame);
+    return !taker.empty() && taker != lost.partition;
+  };
+  if (std::any_of(lost.frames.begin(), lost.frames.end(), is_taken)) return Returned::kAsOther;
   const auto found = partitions_.find(lost.partition);
   if (found == partitions_.end()) return Returned::kNo;
   const Known& known = found->second;

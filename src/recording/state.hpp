@@ -22,6 +22,7 @@ struct Lost {
   std::string partition;
   std::uint64_t incarnation = 0;  ///< of its process then
   Error error;
+  std::vector<std::string> frames{};  ///< at whose edges it was needed
 };
 
 /// Whether the process of a partition that was lost has returned.

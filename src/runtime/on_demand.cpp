@@ -89,8 +89,15 @@ Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,
       discovery_.wait_for_change(deadline);
       continue;
     }
-    auto answer = ask_one(owners[turn % owners.size()], request, deadline);
-    if (answer) return answer;
+    const auto asked = Clock::now();
+    const Owner owner = owners[turn % owners.size()];
+    auto answer = ask_one(owner, request, deadline);
+    if (answer) {
+      if (may_lack(request, *answer)) merge(*answer, ask_others(owner, request, deadline));
+      take(request, *answer, asked);
+      await_owners(*answer, deadline);
+      return answer;
+    }
     last = std::move(answer.error());
     refusals = is_of_owner(last->code) ? refusals + 1 : 0;
     const bool all_refuse = refusals >= owners.size() && discovery_.complete();
@@ -115,7 +122,6 @@ Result<std::vector<KnownFrame>> OnDemand::ask_one(Owner owner, const FramesReque
     if (!part) return tl::unexpected(std::move(part.error()));
     parts.push_back(*std::move(part));
   }
-  const auto asked = Clock::now();
   Reply reply = std::move(links_.ask(parts, deadline.within(kPatience)).front());
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
   auto* answer = std::get_if<std::vector<KnownFrame>>(&reply.body);
@@ -123,9 +129,40 @@ Result<std::vector<KnownFrame>> OnDemand::ask_one(Owner owner, const FramesReque
     return fail(Errc::kUnsupported, "partition " + quote(parts[0].partition) +
                                         " gave another answer than that it was asked for");
   }
-  take(request, *answer, asked);
-  await_owners(*answer, deadline);
   return std::move(*answer);
+}
+
+std::vector<KnownFrame> OnDemand::ask_others(Owner asked, const FramesRequest& request,
+                                             const Deadline& deadline) {
+  std::vector<Part> parts;
+  {
+    const Lock lock(structure_.mutex);
+    for (const Owner owner : structure_.directory.reachable_owners()) {
+      const std::string& name = structure_.directory.name(owner);
+      if (owner != asked) parts.push_back({owner, name, Request{0, name, request}});
+    }
+  }
+  std::vector<KnownFrame> all;
+  if (parts.empty()) return all;
+  for (Reply& reply : links_.ask(parts, deadline.within(kPatience))) {
+    auto* known = std::get_if<std::vector<KnownFrame>>(&reply.body);
+    if (known != nullptr) merge(all, std::move(*known));
+  }
+  return all;
+}
+
+bool OnDemand::may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer) {
+  const auto is_missing = [&answer](const std::string& id) {
+    return std::none_of(answer.begin(), answer.end(),
+                        [&id](const KnownFrame& frame) { return frame.id == id; });
+  };
+  if (request.trees.empty() && std::none_of(request.ids.begin(), request.ids.end(), is_missing)) {
+    return false;
+  }
+  const Lock lock(structure_.mutex);
+  const auto partitions = structure_.directory.partitions();
+  return std::any_of(partitions.begin(), partitions.end(),
+                     [](const PartitionInfo& partition) { return !partition.reachable; });
 }
 
 // Nobody was discovered, so there are no frames; or all have left, so nobody can say.

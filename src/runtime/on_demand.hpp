@@ -16,7 +16,8 @@
 namespace tfdude {
 
 /// Asks owners for the frames that this participant needs, and does not keep (Options::follow).
-/// Each owner knows all frames, so any of them may answer.
+/// Each owner knows all frames, so any of them may answer; but one that has started after another was
+/// lost does not know the frames of that. So what is missing is asked of all.
 /// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
 class OnDemand {
  public:
@@ -52,6 +53,11 @@ class OnDemand {
                                                     const Deadline& deadline);
   [[nodiscard]] Result<std::vector<KnownFrame>> ask_one(Owner owner, const FramesRequest& request,
                                                         const Deadline& deadline);
+  /// What all others know.
+  [[nodiscard]] std::vector<KnownFrame> ask_others(Owner asked, const FramesRequest& request,
+                                                   const Deadline& deadline);
+  /// Whether others may know more than this answer.
+  [[nodiscard]] bool may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer);
   [[nodiscard]] Result<std::vector<KnownFrame>> nobody(const FramesRequest& request);
   void take(const FramesRequest& request, const std::vector<KnownFrame>& answer,
             Clock::time_point asked);

@@ -55,7 +55,17 @@ Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline)
     if (!info) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
     return *std::move(info);
   };
-  return requests_.find(deadline, {id}, Task::kFresh, find);
+  auto info = requests_.find(deadline, {id}, Task::kFresh, find);
+  if (info || info.error().code != Errc::kUnknownFrame || requests_.on_demand() != nullptr) {
+    return info;
+  }
+  for (KnownFrame& frame : frames_before({{id}})) {
+    if (frame.id != id) continue;
+    const Lock lock(structure_.mutex);
+    const auto owner = structure_.directory.owner(frame.partition);
+    if (owner) return FrameInfo{std::move(frame.id), std::move(frame.parent), *owner, true};
+  }
+  return info;
 }
 
 // Each is listed after its parent.
@@ -80,31 +90,30 @@ bool Queries::knows_all() {
   return !structure_.directory.only_heard_of();
 }
 
-std::vector<KnownFrame> Queries::frames_before() {
+std::vector<KnownFrame> Queries::frames_before(const FramesRequest& wanted) {
   if (knows_all()) return {};
   const Deadline deadline = discovery_.call_deadline();
   std::vector<Part> owners;
   {
     const Lock lock(structure_.mutex);
     for (const Owner owner : structure_.directory.reachable_owners()) {
-      const FramesRequest all{{}, {std::string(1, kAnyName)}};
       const std::string& name = structure_.directory.name(owner);
-      owners.push_back({owner, name, Request{0, name, all}});
+      owners.push_back({owner, name, Request{0, name, wanted}});
     }
   }
-  for (Part& owner : owners) {
-    std::vector<Part> parts{std::move(owner)};
-    Reply reply = std::move(requests_.ask(parts, deadline).front());
+  // Those that have started since do not know them.
+  std::vector<KnownFrame> all;
+  for (Reply& reply : requests_.ask(owners, deadline)) {
     auto* known = std::get_if<std::vector<KnownFrame>>(&reply.body);
-    if (known != nullptr && !known->empty()) return std::move(*known);
+    if (known != nullptr) merge(all, std::move(*known));
   }
-  return {};
+  return all;
 }
 
 Result<std::vector<Frame>> Queries::frames() {
   if (requests_.on_demand() != nullptr) return followed();
   if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
-  std::vector<KnownFrame> before = frames_before();
+  std::vector<KnownFrame> before = frames_before({{}, {std::string(1, kAnyName)}});
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());

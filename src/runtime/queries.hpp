@@ -46,8 +46,9 @@ class Queries {
   [[nodiscard]] Result<std::vector<Frame>> followed();
   /// Whether no partition was lost before this process started.
   [[nodiscard]] bool knows_all();
-  /// Frames of partitions that were lost before this process started, as an owner knows them.
-  [[nodiscard]] std::vector<KnownFrame> frames_before();
+  /// Of the wanted frames those that owners know, if a partition was lost before this process
+  /// started.
+  [[nodiscard]] std::vector<KnownFrame> frames_before(const FramesRequest& wanted);
   [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }
 
   Structure& structure_;

@@ -118,6 +118,28 @@ TEST_CASE("bounds: neither a flush nor the end of a client waits for a process t
   CHECK(log.count("leaving") == 0);
 }
 
+// The process that returns was sent nothing, so it has nothing to acknowledge.
+TEST_CASE("bounds: a flush after the return of an owner waits for nothing that came before it") {
+  ThesisDaemons d;
+  std::optional<Client> client = Client::open(d.domain.options()).value();
+  const std::vector<EdgeUpdate> edge{{"hand_left", testing::along_x(7)}};
+  REQUIRE(testing::eventually([&] { return client->publish(edge).has_value(); }));
+  const auto arrived = [&] {
+    const auto X = client->lookup(client->parent("hand_left").value(), "hand_left");
+    return X && X->pose.translation().x() == 7;
+  };
+  REQUIRE(testing::eventually(arrived));
+  d.arms->signal(SIGKILL);
+  REQUIRE(testing::eventually([&] { return !client->lookup("world", "hand_left"); }));
+  d.arms.reset();
+  d.arms.emplace(d.domain.serve(testing::kArmsFile));
+  REQUIRE(testing::eventually([&] { return client->lookup("world", "hand_left").has_value(); }));
+  CHECK(client->flush(10'000ms));
+  const auto end = Clock::now();
+  client.reset();
+  CHECK(Clock::now() - end < 5s);
+}
+
 TEST_CASE("bounds: no flush succeeds while another one still waits for an acknowledgement") {
   ThesisDaemons d;
   auto client = Client::open(d.domain.options()).value();

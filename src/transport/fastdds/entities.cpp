@@ -92,18 +92,24 @@ bool Writer::flush(const Mark& mark, Deadline deadline,
                    Acknowledgements* acknowledgements) {
   std::uint64_t before = acknowledged_;
   if (before >= mark.written) return true;
-  std::vector<PeerId> readers;
+  std::multimap<PeerId, std::uint64_t> matched;
   {
     const Lock lock(mutex_);
-    readers.assign(reader_peers_.begin(), reader_peers_.end());
+    matched = readers_before_;
   }
-  const std::size_t matched = readers.size();
-  if (gone) readers.erase(std::remove_if(readers.begin(), readers.end(), gone), readers.end());
-  const bool all = readers.size() == matched;
-  // Nobody is left who could acknowledge it.
+  bool all = true;
+  std::vector<PeerId> owing;
+  for (const auto& [reader, before_it] : matched) {
+    if (gone && gone(reader)) {
+      all = false;
+    } else if (before_it < mark.last) {
+      owing.push_back(reader);
+    }
+  }
+  // Perhaps nobody is left who could acknowledge it.
   const bool acknowledged =
-      readers.empty() ||
-      (all ? await_all(deadline) : await_some(mark, deadline, readers, *acknowledgements));
+      matched.empty() ||
+      (all ? await_all(deadline) : await_some(mark, deadline, owing, *acknowledgements));
   if (!acknowledged) return false;
   // Another flush may have waited for more.
   while (before < mark.written && !acknowledged_.compare_exchange_weak(before, mark.written)) {
@@ -150,9 +156,10 @@ void Writer::on_publication_matched(edds::DataWriter*,
   {
     const Lock lock(mutex_);
     const PeerId peer = peer_of(ertps::iHandle2GUID(status.last_subscription_handle).guidPrefix);
-    if (status.current_count_change > 0) reader_peers_.insert(peer);
-    const auto left = reader_peers_.find(peer);
-    if (status.current_count_change < 0 && left != reader_peers_.end()) reader_peers_.erase(left);
+    if (status.current_count_change > 0) readers_before_.emplace(peer, last_);
+    const auto left = readers_before_.find(peer);
+    if (status.current_count_change < 0 && left != readers_before_.end())
+      readers_before_.erase(left);
     one_more = status.current_count > readers_;
     if (readers_ == 0) matched_at_ = Deadline::clock::now();
     if (status.current_count == 0) replies_arrive_ = false;

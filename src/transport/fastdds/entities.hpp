@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -137,7 +137,8 @@ class Writer final : public edds::DataWriterListener {
   mutable Mutex mutex_;
   std::string mismatch_ TFDUDE_GUARDED_BY(mutex_);
   Condition matched_;
-  std::multiset<PeerId> reader_peers_ TFDUDE_GUARDED_BY(mutex_);
+  // The readers, and what was written before each was matched, which it is not sent.
+  std::multimap<PeerId, std::uint64_t> readers_before_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<int> readers_{0};                 // changed under mutex_
   std::atomic<std::uint64_t> written_{0};       // number of samples, counted once written
   std::atomic<std::uint64_t> last_{0};          // as in Mark

@@ -102,6 +102,7 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
   server.heard.present = true;
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
+  overtake(presence);
   there_(presence);
 }
 
@@ -169,13 +170,16 @@ bool Peers::silent(const std::string& partition) const {
 bool Peers::replaced(const PeerId& peer) const {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer);
-  if (known == servers_.end() || !known->second.silent) return false;
-  const Presence* old = known->second.said();
-  return old != nullptr && std::any_of(servers_.begin(), servers_.end(), [old](const auto& one) {
-           const auto& presence = one.second.presence;
-           return presence && !one.second.silent && presence->serving &&
-                  presence->partition == old->partition && presence->incarnation > old->incarnation;
-         });
+  return known != servers_.end() && known->second.silent && known->second.overtaken;
+}
+
+void Peers::overtake(const Presence& later) {
+  if (!later.serving) return;
+  for (auto& [id, server] : servers_) {
+    const Presence* said = server.said();
+    server.overtaken = server.overtaken || (said != nullptr && said->partition == later.partition &&
+                                            said->incarnation < later.incarnation);
+  }
 }
 
 bool Peers::awaits_presence() const {

@@ -101,7 +101,7 @@ class Peers {
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
-  /// Whether a server is silent, and a later process serves its partition.
+  /// Whether a server is silent, and a later process serves its partition, or has.
   [[nodiscard]] bool replaced(const PeerId& peer) const;
 
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
@@ -119,6 +119,7 @@ class Peers {
     std::size_t peers = 0;
     Hearing heard{Clock::now()};
     bool silent = false;
+    bool overtaken = false;  // a later process has served its partition
 
     [[nodiscard]] const Presence* said() const {
       const bool later = by_page && presence && by_page->incarnation > presence->incarnation;
@@ -128,6 +129,8 @@ class Peers {
   };
 
   Server& follow(const PeerId& peer) TFDUDE_REQUIRES(mutex_);
+  /// Notes which earlier processes of its partition a server takes the place of.
+  void overtake(const Presence& later) TFDUDE_REQUIRES(mutex_);
   void hear(Server& server, Clock::time_point at) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
   /// The largest number of servers that one of them hears beyond those known here, and the

@@ -233,6 +233,25 @@ TEST_CASE("recording: a frame that another partition takes over has no value of 
   CHECK(newest(recording, "hand", 8.2) == "not_yet");
   CHECK(newest(recording, "hand", 8.6) == "53.000000");
   CHECK(then(recording, "hand", 8.6) == "not_yet");
+  // Nobody knows where they were before.
+  CHECK(then(recording, "hand", 7) == "unreachable");
+  CHECK(then(recording, "arm", 7) == "unreachable");
+  CHECK(then(recording, "arm", 8.6) == "3.000000");
+  const Trajectory all = recording.trajectory("base", "arm", {at(7), at(8.6)});
+  CHECK_FALSE(all.X_AB[0]);
+  CHECK(all.X_AB[1]);
+}
+
+TEST_CASE("recording: a frame that is added again elsewhere was nowhere before") {
+  Film film;
+  film.add("spare", ReachNews{true, ""}, 6);
+  film.add("spare", FramesNews{{}, 9}, 6);
+  film.add("spare", FramesNews{{{"arm", "base"}}, 9}, 8);
+  film.add("spare", ValuesNews{1, {fixed(0, 700)}}, 8.1);
+  Recording recording = film.watched();
+  CHECK(then(recording, "arm", 4) == "1.000000");
+  CHECK(then(recording, "arm", 7) == "unreachable");
+  CHECK(then(recording, "arm", 9) == "700.000000");
 }
 
 TEST_CASE("recording: the state of a value that is that of no instant is repeated in each file") {
