@@ -79,8 +79,7 @@ Result<void> check_watch(const WatchRequest& request) {
   constexpr std::chrono::nanoseconds kLongest = kMaxWatchPeriod;
   if (request.period >= std::chrono::nanoseconds(0) && request.period <= kLongest) return {};
   return fail(Errc::kInvalidInput, "the period of a watch must be within 0 and " +
-                                       in_milliseconds(kLongest) + ", not " +
-                                       in_milliseconds(request.period));
+                                       readable(kLongest) + ", not " + readable(request.period));
 }
 
 void CovarianceNumbers::push(PushedValue& value) {

@@ -93,7 +93,9 @@ Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,
     const Owner owner = owners[turn % owners.size()];
     auto answer = ask_one(owner, request, deadline);
     if (answer) {
-      if (may_lack(request, *answer)) merge(*answer, ask_others(owner, request, deadline));
+      if (may_lack(request, *answer, deadline)) {
+        merge(*answer, ask_others(owner, request, deadline));
+      }
       take(request, *answer, asked);
       await_owners(*answer, deadline);
       return answer;
@@ -151,7 +153,8 @@ std::vector<KnownFrame> OnDemand::ask_others(Owner asked, const FramesRequest& r
   return all;
 }
 
-bool OnDemand::may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer) {
+bool OnDemand::may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer,
+                        const Deadline& deadline) {
   const auto is_missing = [&answer](const std::string& id) {
     return std::none_of(answer.begin(), answer.end(),
                         [&id](const KnownFrame& frame) { return frame.id == id; });
@@ -159,6 +162,8 @@ bool OnDemand::may_lack(const FramesRequest& request, const std::vector<KnownFra
   if (request.trees.empty() && std::none_of(request.ids.begin(), request.ids.end(), is_missing)) {
     return false;
   }
+  // Others may not have told yet who is lost.
+  while (!discovery_.complete() && !deadline.over()) discovery_.wait_for_change(deadline);
   const Lock lock(structure_.mutex);
   const auto partitions = structure_.directory.partitions();
   return std::any_of(partitions.begin(), partitions.end(),

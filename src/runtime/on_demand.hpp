@@ -57,7 +57,8 @@ class OnDemand {
   [[nodiscard]] std::vector<KnownFrame> ask_others(Owner asked, const FramesRequest& request,
                                                    const Deadline& deadline);
   /// Whether others may know more than this answer.
-  [[nodiscard]] bool may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer);
+  [[nodiscard]] bool may_lack(const FramesRequest& request, const std::vector<KnownFrame>& answer,
+                              const Deadline& deadline);
   [[nodiscard]] Result<std::vector<KnownFrame>> nobody(const FramesRequest& request);
   void take(const FramesRequest& request, const std::vector<KnownFrame>& answer,
             Clock::time_point asked);

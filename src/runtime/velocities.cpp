@@ -93,8 +93,8 @@ Result<Velocities::Interval> Velocities::interval(const std::string& a, const st
   }
   const Time begin = earlier_by(end, query.over);
   if (is_stamp(begin)) return Interval{begin, end};
-  return fail(Errc::kTooOld, "the interval begins " + in_milliseconds(apart(begin, Time{})) +
-                                 " before the clock starts");
+  return fail(Errc::kTooOld,
+              "the interval begins " + readable(apart(begin, Time{})) + " before the clock starts");
 }
 
 Result<StampedTransform> Velocities::lookup(const std::string& a, const std::string& b,
@@ -109,7 +109,7 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
                                       const VelocityQuery& query, const Deadline& deadline) {
   if (query.over <= std::chrono::nanoseconds(0)) {
     return fail(Errc::kInvalidInput,
-                "the interval of a velocity must be positive, not " + in_milliseconds(query.over));
+                "the interval of a velocity must be positive, not " + readable(query.over));
   }
   if (auto ok = check_stamp(query.at); !ok) return tl::unexpected(std::move(ok.error()));
   auto newest = lookup(a, b, {}, deadline);

@@ -12,12 +12,11 @@ namespace {
 
 Result<void> check_timing(const EdgeTiming& timing) {
   if (timing.span <= std::chrono::nanoseconds(0)) {
-    return fail(Errc::kInvalidInput,
-                "history span must be positive, not " + in_milliseconds(timing.span));
+    return fail(Errc::kInvalidInput, "history span must be positive, not " + readable(timing.span));
   }
   if (timing.max_ahead < std::chrono::nanoseconds(0)) {
-    return fail(Errc::kInvalidInput, "history max_ahead must not be negative, as " +
-                                         in_milliseconds(timing.max_ahead) + " is");
+    return fail(Errc::kInvalidInput,
+                "history max_ahead must not be negative, as " + readable(timing.max_ahead) + " is");
   }
   constexpr std::size_t kMaxCount = 1U << 24U;
   if (timing.count < 2 || timing.count > kMaxCount) {

@@ -4,6 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/compared.hpp"
 #include "base/saturating.hpp"
 #include "base/stamp.hpp"
 #include "math/finite.hpp"
@@ -168,11 +169,10 @@ Result<void> Forest::rewrite(std::string_view id, const TimeInterval& interval,
   const std::int64_t newest = follows ? values.back().stamp : edge.stamp;
   const auto span = impl_->timing_of(edge).span;
   if (values.front().stamp < saturating_subtract(newest, span.count())) {
-    return fail(Errc::kTooOld,
-                "frame " + quote(id) + ": the first sample is " +
-                    in_milliseconds(std::chrono::nanoseconds(newest - values.front().stamp)) +
-                    " older than the newest, more than the " + in_milliseconds(span) +
-                    " that are kept");
+    const auto [by, most] = compared(std::chrono::nanoseconds(newest - values.front().stamp), span);
+    return fail(Errc::kTooOld, "frame " + quote(id) + ": the first sample is " + by +
+                                   " older than the newest, more than the " + most +
+                                   " that are kept");
   }
   impl_->replace_samples(edge, from, to, values);
   impl_->commit();

@@ -2,6 +2,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/compared.hpp"
 #include "base/saturating.hpp"
 #include "base/stamp.hpp"
 #include "math/finite.hpp"
@@ -89,10 +90,10 @@ Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t sta
                                          readable(time_of(clock_.before_jump())) + "; now it is " +
                                          readable(time_of(*now)));
   }
-  return fail(Errc::kInvalidInput, what + in_milliseconds(std::chrono::nanoseconds(ahead)) +
-                                       " ahead of " + clock + ", " + readable(time_of(*now)) +
-                                       ", more than the " +
-                                       in_milliseconds(timing_of(edge).max_ahead) + " allowed");
+  const auto [by, most] = compared(std::chrono::nanoseconds(ahead), timing_of(edge).max_ahead);
+  return fail(Errc::kInvalidInput, what + by + " ahead of " + clock + ", " +
+                                       readable(time_of(*now)) + ", more than the " + most +
+                                       " allowed");
 }
 
 void Forest::Impl::push_value(std::uint32_t slot, const GivenValue& value, std::int64_t stamp) {

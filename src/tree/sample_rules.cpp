@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/time.hpp"
 
+#include "base/compared.hpp"
 #include "tree/revised_sample.hpp"
 #include "tree/sample_history.hpp"
 
@@ -55,11 +56,11 @@ Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   newest.name->refused.more().old.fetch_add(1, std::memory_order_relaxed);
   const std::string what = "frame " + quote(newest.name->text) + ": the sample is ";
   if (stamp < limit) {
-    return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, newest.stamp)) +
-                                   " older than the newest, more than the " +
-                                   in_milliseconds(samples.timing().span) + " that are kept");
+    const auto [by, most] = compared(apart(stamp, newest.stamp), samples.timing().span);
+    return fail(Errc::kTooOld,
+                what + by + " older than the newest, more than the " + most + " that are kept");
   }
-  return fail(Errc::kTooOld, what + in_milliseconds(apart(stamp, samples.stamp(samples.oldest()))) +
+  return fail(Errc::kTooOld, what + readable(apart(stamp, samples.stamp(samples.oldest()))) +
                                  " older than the oldest of the " +
                                  std::to_string(samples.timing().count) + " that are kept");
 }

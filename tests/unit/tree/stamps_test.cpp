@@ -63,7 +63,7 @@ TEST_CASE("a stamp from the future is rejected and the error names both times") 
   CHECK(first.error().code == Errc::kInvalidInput);
   CHECK_THAT(first.error().message, ContainsSubstring("'arm'") && ContainsSubstring("2255-03-14") &&
                                         ContainsSubstring("2023-11-14 22:13:20.000 UTC") &&
-                                        ContainsSubstring("60000.000 ms"));
+                                        ContainsSubstring("more than the 60.0 s allowed"));
   CHECK(arm.x() == 7);
   CHECK(arm.history().refused_ahead == 1);
   REQUIRE(arm.sample(1, kNow));
