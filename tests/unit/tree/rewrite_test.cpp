@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tfdude/math/interpolate.hpp"
+#include "tfdude/math/joint.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
@@ -233,6 +234,48 @@ TEST_CASE("a watcher is told a rewrite only from its interval on") {
   join_histories(values);
   CHECK(values.size() == slam.forest.histories("odom").at(0).samples);
   CHECK_FALSE(values[0].kept_before);
+}
+
+TEST_CASE("who watches a joint has all of its way after a rewrite, also to a late position") {
+  // More than half a turn before the late position, and less than that before what was there.
+  const std::int64_t late = GENERATE(150, 320);
+  const Joint joint = revolute_joint(along_x(1), {0, 0, 1});
+  Forest robot;
+  Forest mirror;
+  for (Forest* forest : {&robot, &mirror}) {
+    REQUIRE(forest->add("base", "", {}));
+    REQUIRE(forest->add("arm", "base", joint_transform(joint, 0, 0)));
+    REQUIRE(forest->set_default_timing(long_timing()));
+  }
+  const auto turn = [&](double position, std::int64_t milliseconds) {
+    const CorrelatedUpdate update{*robot.find("arm"),
+                                  joint_transform(joint, position, 0.01),
+                                  nullptr,
+                                  {&joint, {position, 0.01}, 0}};
+    REQUIRE(robot.update_correlated({update}, at(milliseconds)));
+  };
+  std::vector<EdgeCursor> cursors{{"arm", "base"}};
+  const auto follow = [&] {
+    auto values = robot.values_since(cursors, {}).values;
+    join_histories(values);
+    mirror.take({*mirror.find("arm")}, values);
+  };
+  turn(0, 100);
+  follow();
+  turn(1, 200);
+  turn(1, 400);
+  follow();
+  REQUIRE(robot.rewrite("arm", between(300, 400), {{at(350), along_x(3)}}));
+  turn(5, late);
+  follow();
+  for (std::int64_t t = 100; t <= 350; t += 5) {
+    const auto X = robot.lookup("base", "arm", query(t));
+    const auto Y = mirror.lookup("base", "arm", query(t));
+    INFO("at " << t << ": " << outcome(X) << " and " << outcome(Y));
+    REQUIRE(X);
+    REQUIRE(Y);
+    CHECK(transform_diff(*Y, *X, 1e-9) == "");
+  }
 }
 
 TEST_CASE("who begins to watch before a rewrite has all of the other history after it") {
