@@ -289,6 +289,39 @@ TEST_CASE("who begins to watch before a rewrite has all of the other history aft
   CHECK(values.size() == 9);
 }
 
+TEST_CASE("who watches a rewrite knows as well which stamp the owner has made up") {
+  Forest owner([] { return at(500); });
+  Forest mirror;
+  for (Forest* forest : {&owner, &mirror}) {
+    REQUIRE(forest->add("world", "", {}));
+    REQUIRE(forest->add("odom", "world", along_x(0)));
+    REQUIRE(forest->set_default_timing(long_timing()));
+  }
+  std::vector<EdgeCursor> cursors{{"odom", "world"}};
+  const auto follow = [&] {
+    auto values = owner.values_since(cursors, {}).values;
+    join_histories(values);
+    mirror.take({*mirror.find("odom")}, values);
+  };
+  REQUIRE(owner.update("odom", along_x(0), at(100)));
+  follow();
+  REQUIRE(owner.update("odom", along_x(1), at(200)));
+  follow();
+  REQUIRE(owner.update("odom", along_x(2)));  // arrives at 500
+  REQUIRE(owner.update("odom", along_x(3), at(510)));
+  REQUIRE(owner.rewrite("odom", between(150, 250), {{at(220), along_x(7)}}));
+  follow();
+  Query beyond = query(515);
+  beyond.extrapolate = 1s;
+  CHECK(outcome(owner.lookup("world", "odom", beyond)) == "not_yet");
+  CHECK(outcome(mirror.lookup("world", "odom", beyond)) == "not_yet");
+  REQUIRE(owner.update("odom", along_x(4), at(520)));
+  follow();
+  beyond.at = at(525);
+  CHECK(outcome(owner.lookup("world", "odom", beyond)) == "ok");
+  CHECK(outcome(mirror.lookup("world", "odom", beyond)) == "ok");
+}
+
 TEST_CASE("what an earlier process has left does not reach into a rewritten history") {
   Slam slam;
   REQUIRE(slam.forest.resume("odom", {}, {at(1000), false}));
