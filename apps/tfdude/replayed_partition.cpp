@@ -166,16 +166,31 @@ void ReplayedPartition::clear(const std::string& id, const WatchedValue& value, 
   (void)node_.clear_history(id);
 }
 
+void ReplayedPartition::say(const std::string& id, Correlation correlation, Edge& edge) {
+  if (edge.correlation && correlation == *edge.correlation) return;
+  if (node_.correlate(id, correlation)) edge.correlation = std::move(correlation);
+}
+
+Transform ReplayedPartition::served_as(const WatchedValue& value, const Edge& edge) {
+  return value.of_sample() ? whole(value, edge.correlation.value_or(Correlation())) : value.X_PC;
+}
+
 // The samples of the edge from this value on, which is the first of a rewritten past. Those that a
 // replay does not keep are left out.
-void ReplayedPartition::rewrite(const std::string& id, const ValuesNews& values,
-                                std::size_t first) {
+void ReplayedPartition::rewrite(const std::string& id, const ValuesNews& values, std::size_t first,
+                                Edge& edge) {
   const WatchedValue& begin = values.values[first];
-  std::vector<EdgeSample> samples;
+  std::vector<const WatchedValue*> told;
   for (std::size_t i = first; i < values.values.size(); ++i) {
     const WatchedValue& value = values.values[i];
-    if (value.frame == begin.frame && value.stamp) samples.push_back({*value.stamp, value.X_PC});
+    if (value.frame == begin.frame && value.stamp) told.push_back(&value);
   }
+  const auto last = std::find_if(told.rbegin(), told.rend(),
+                                 [](const WatchedValue* value) { return !value->of_sample(); });
+  if (last != told.rend()) say(id, replayed((*last)->correlation), edge);
+  std::vector<EdgeSample> samples;
+  for (const WatchedValue* value : told)
+    samples.push_back({*value->stamp, served_as(*value, edge)});
   const EdgeTiming kept;  // the default
   const Time oldest = samples.back().stamp - kept.span;
   const auto from = std::find_if(samples.begin(), samples.end(),
@@ -217,18 +232,15 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
       continue;
     }
     if (value.kept_before && value.stamp && edge.dynamic) {
-      rewrite(frame.id, values, i);
+      rewrite(frame.id, values, i, edge);
       rewritten.insert(value.frame);
       continue;
     }
     if (value.begins) begin(frame, value, edge);
-    if (correlates() && node_.correlate(frame.id, correlation)) {
-      edge.correlation = std::move(correlation);
-    }
+    if (!of_sample) say(frame.id, std::move(correlation), edge);
     if (!value.stamp && edge.dynamic) continue;
     edge.dynamic = value.stamp.has_value();
-    batch_.push_back({frame.id, of_sample ? whole(value, edge.correlation.value_or(Correlation()))
-                                          : value.X_PC});
+    batch_.push_back({frame.id, served_as(value, edge)});
   }
   return flush();
 }

@@ -47,7 +47,11 @@ class ReplayedPartition {
   void settle(const ValuesNews& values);
   [[nodiscard]] bool place(const WatchedFrame& frame, const WatchedValue* value);
   void begin(const WatchedFrame& frame, const WatchedValue& value, Edge& edge);
-  void rewrite(const std::string& id, const ValuesNews& values, std::size_t first);
+  /// Says how the edge is correlated, if that is another way than before.
+  void say(const std::string& id, Correlation correlation, Edge& edge);
+  /// With all of its covariance: only that of a sample says how that sample is correlated.
+  [[nodiscard]] static Transform served_as(const WatchedValue& value, const Edge& edge);
+  void rewrite(const std::string& id, const ValuesNews& values, std::size_t first, Edge& edge);
   void clear(const std::string& id, const WatchedValue& value, Edge& edge);
   [[nodiscard]] Result<void> flush();
 

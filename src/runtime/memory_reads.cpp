@@ -152,10 +152,11 @@ void MemoryReads::attach(Owner owner) {
   if (!memory) return refused(memory.error());
   const auto forest = RemoteForest::open(memory->at.get(), memory->size);
   if (!forest) return refused(forest.error());
-  edges_.attach(owner, *forest, memory->at);
-  kept_.attach(owner, *forest, memory->at);
   {
+    // At once: drop_kept() takes what it finds in only one of them for that of an earlier process.
     const Lock lock(mutex_);
+    edges_.attach(owner, *forest, memory->at);
+    kept_.attach(owner, *forest, memory->at);
     memories_[owner] = {incarnation, std::make_shared<const RemoteForest>(*forest),
                         *std::move(memory)};
   }

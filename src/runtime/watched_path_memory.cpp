@@ -124,6 +124,8 @@ Watched::Looked WatchedPath::look(Clock::time_point now) {
     // What a mirror has shown before is not new.
     const bool known =
         begins && newest && newest_ && newest->stamp == newest_->stamp && same(*newest, *newest_);
+    // A clock was set back, or the end of the past was rewritten.
+    if (newest && newest_ && newest->stamp < newest_->stamp) forget_newest();
     remember(std::move(newest));
     if (known) return {};
     messages_.fetch_add(1, std::memory_order_relaxed);

@@ -116,11 +116,11 @@ class Telling {
     if (values_.size() == begin_) tell_newest(0);
   }
   void tell_no_sample(std::uint64_t seen);
+  void tell_between(const Sample& before, const Sample& after);
 
   void finish(bool begins);
 
  private:
-  void tell_between(const Sample& before, const Sample& after);
   void tell(const Sample& sample);
   void tell_row(std::int64_t stamp, const Transform& X, const Correlation& row);
   void tell_newest();
@@ -236,10 +236,18 @@ std::int64_t kept_before(const HeldVersion& edge, const EdgeCursor& cursor) {
 void add_rewritten(const HeldVersion& edge, std::uint32_t index, const PushedQuery& query,
                    std::int64_t from, const EdgeCursor& cursor, std::vector<PushedValue>& values) {
   const std::size_t place = values.size();
+  const SampleHistory& samples = *edge.samples;
+  std::uint64_t first = edge.number;
+  while (first > samples.oldest() && samples.stamp(first - 1) >= from) --first;
+  // To a late position of a joint there is a way, which was not told, either.
+  const Sample* before = first > samples.oldest() ? samples.sample(first - 1) : nullptr;
+  const Sample* there = samples.sample(first);
+  const bool on_the_way =
+      before != nullptr && there != nullptr && !instants_between(*before, *there).empty();
+  if (on_the_way) from = std::min(from, before->stamp + 1);
   values.push_back({index, time_of(from), {}, {}, cursor.history, {}});
   Telling telling(edge, index, query.of_samples, values);
-  std::uint64_t first = edge.number;
-  while (first > edge.samples->oldest() && edge.samples->stamp(first - 1) >= from) --first;
+  if (on_the_way) telling.tell_between(*before, *there);
   telling.tell_samples(first, 0);
   telling.finish(true);
   values[place].X = values[place + 1].X;

@@ -125,20 +125,23 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
   std::deque<SampleRevision> revisions;  // which the samples refer to
   std::vector<TimedValue> samples;
   samples.reserve(values.size() - skipped);
+  std::size_t made_up = 0;  // samples up to the last whose stamp is
   for (std::size_t i = skipped; i < values.size(); ++i) {
     const PushedValue& told = *values[i];
     const std::int64_t stamp = nanoseconds(*told.stamp);
     const bool follows = samples.empty() || stamp > samples.back().stamp;
     if (stamp < oldest || stamp < 0 || !follows || !is_finite(told.X)) continue;
     samples.push_back({stamp, &told.X, nullptr});
+    if (told.made_up) made_up = samples.size();
     if (is_of_sample(told)) {
       samples.back().revision = &revisions.emplace_back(SampleRevision{told.X, told.correlation});
     }
   }
   if (samples.empty()) return;
   replace_samples(edge, nanoseconds(*values.front()->kept_before), kEnd, samples);
+  const HeldVersion& fresh = frames_.newest_value(slot);
+  if (made_up > 0) fresh.samples->set_made_up(fresh.number - (samples.size() - made_up));
   if (samples.back().revision != nullptr) show_revision(slot);
-  if (values.back()->made_up && samples.back().stamp == newest) mark_made_up(slot);
 }
 
 Result<void> Forest::check_rewrite(std::string_view id, const TimeInterval& interval,

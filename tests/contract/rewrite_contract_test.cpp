@@ -186,6 +186,29 @@ TEST_CASE("rewrite: who looks up or watches has one history or the other") {
   CHECK(seen > 20);
 }
 
+TEST_CASE("rewrite: the last transform is shown, however early the past that was rewritten ends") {
+  Slam slam(joined_by(testing::networks().front()));
+  REQUIRE(slam.node->add("lamp", "odom", along_x(0), "slam"));
+  for (const std::int64_t t : {std::int64_t{0}, kEnd}) {
+    REQUIRE(slam.node->update("lamp", along_x(0), ms(t)));
+  }
+  // In its own memory.
+  const auto path = slam.node->watch("map", "lamp");
+  REQUIRE(path);
+  const auto shown = [&] {
+    const auto X = path->latest();
+    return X && X->stamp ? nanoseconds(*X->stamp) / kMs : -1;
+  };
+  REQUIRE(eventually([&] { return shown() == kEnd; }));
+  const std::uint64_t messages = path->messages();
+  REQUIRE(slam.node->rewrite("odom", {ms(0), ms(kEnd)}, saying(1, 0, 4000)));
+  REQUIRE(path->wait_for_more(messages, std::chrono::steady_clock::now() + 10s));
+  CHECK(shown() == 4000);
+  // The edges have no instant in common any more.
+  REQUIRE(slam.node->rewrite("odom", {ms(0), ms(kEnd + 1000)}, {{ms(kEnd + 1000), along_x(1)}}));
+  CHECK(eventually([&] { return shown() == 4000; }));
+}
+
 TEST_CASE("rewrite: a recording has both, what was believed before and what after") {
   Slam slam(joined_by(GENERATE(from_range(testing::networks()))));
   const auto path = std::filesystem::temp_directory_path() /

@@ -1,6 +1,7 @@
 // The past is rewritten on the command line, with a real daemon, and as docs/rewriting.md says.
 
 #include <chrono>
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -9,6 +10,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tfdude/client/client.hpp"
+#include "tfdude/recording/recording.hpp"
+#include "tfdude/recording/recording_writer.hpp"
+
 #include "support/catch.hpp"
 #include "support/process.hpp"
 #include "support/test_domain.hpp"
@@ -16,6 +21,7 @@
 namespace tfdude {
 namespace {
 
+using namespace std::chrono_literals;
 using nlohmann::json;
 using testing::Approx;
 using testing::CliResult;
@@ -140,6 +146,59 @@ TEST_CASE("rewrite: an interval, lines of JSON from a pipe, and errors that name
              ContainsSubstring("sample"));
   CHECK_THAT(why("nobody", names + "nobody,1695000001,0,0,0\n"), ContainsSubstring("nobody"));
   CHECK(slam.x("1695000003") == 1);
+}
+
+// An observation has corrected a sample of what is rewritten: its covariance is in two parts.
+TEST_CASE("rewrite: a replay is no more certain of the past than the recording") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/slam.mcap";
+  const auto at = [](double seconds) { return time_of(static_cast<std::int64_t>(seconds * 1e9)); };
+  const Transform X{Pose(), *Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.01})};
+  {
+    auto writer = RecordingWriter::create(file, at(1000));
+    REQUIRE(writer);
+    const auto add = [&](auto what, double time) {
+      REQUIRE(writer->add(PartitionNews{"slam", std::move(what)}, at(time)));
+    };
+    add(ReachNews{true, ""}, 1000);
+    add(FramesNews{{{"map", ""}, {"odom", "map"}}, 5}, 1000);
+    add(ValuesNews{1, {{1, at(1000), X, {}, Covariance()}}}, 1000);
+    add(ValuesNews{2, {{1, at(1001), X}}}, 1001);
+    const CommonError observed{"observed:1", false, Loading::Constant(6, 1, 0.1)};
+    const CommonError scale{"scale", false, Loading::Constant(6, 1, 0.2)};
+    ValuesNews rewritten{3, {{1, at(1001), X, {false, {scale}, {}}, Covariance()}}};
+    rewritten.values[0].kept_before = at(1000.5);
+    rewritten.values.push_back({1, at(1001.5), X, {false, {observed}, {"odom"}}});
+    add(std::move(rewritten), 1002);
+    for (int i = 0; i < 80; ++i) {
+      const double time = 1002.5 + 0.1 * i;
+      add(ValuesNews{4U + static_cast<unsigned>(i), {{1, at(time), X}}}, time);
+    }
+    REQUIRE(writer->finish(at(1010)));
+  }
+  auto recording = Recording::open(file);
+  REQUIRE(recording);
+  Process replay = domain.start_cli({"replay", file});
+  auto client = Client::open(domain.options());
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return client->parent("odom").has_value(); }));
+  Query query;
+  query.at = at(1003);
+  REQUIRE(client->lookup("map", "odom", query, 20s));
+  for (const double time : {1000.25, 1001.0, 1001.5}) {
+    query.at = at(time);
+    const auto served = client->lookup("map", "odom", query);
+    const auto recorded = recording->lookup_at("map", "odom", *query.at, query);
+    REQUIRE(served);
+    REQUIRE(recorded);
+    const auto& a = served->covariance.of_specified().matrix();
+    const auto& b = recorded->covariance.of_specified().matrix();
+    INFO(time << ": " << a(0, 0) << " and " << b(0, 0));
+    CHECK((a - b).cwiseAbs().maxCoeff() < 1e-12);
+  }
+  replay.signal(SIGINT);
+  (void)testing::finish(replay);
 }
 
 }  // namespace tfdude

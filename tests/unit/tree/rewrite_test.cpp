@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tfdude/math/interpolate.hpp"
+#include "tfdude/math/joint.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
@@ -235,6 +236,48 @@ TEST_CASE("a watcher is told a rewrite only from its interval on") {
   CHECK_FALSE(values[0].kept_before);
 }
 
+TEST_CASE("who watches a joint has all of its way after a rewrite, also to a late position") {
+  // More than half a turn before the late position, and less than that before what was there.
+  const std::int64_t late = GENERATE(150, 320);
+  const Joint joint = revolute_joint(along_x(1), {0, 0, 1});
+  Forest robot;
+  Forest mirror;
+  for (Forest* forest : {&robot, &mirror}) {
+    REQUIRE(forest->add("base", "", {}));
+    REQUIRE(forest->add("arm", "base", joint_transform(joint, 0, 0)));
+    REQUIRE(forest->set_default_timing(long_timing()));
+  }
+  const auto turn = [&](double position, std::int64_t milliseconds) {
+    const CorrelatedUpdate update{*robot.find("arm"),
+                                  joint_transform(joint, position, 0.01),
+                                  nullptr,
+                                  {&joint, {position, 0.01}, 0}};
+    REQUIRE(robot.update_correlated({update}, at(milliseconds)));
+  };
+  std::vector<EdgeCursor> cursors{{"arm", "base"}};
+  const auto follow = [&] {
+    auto values = robot.values_since(cursors, {}).values;
+    join_histories(values);
+    mirror.take({*mirror.find("arm")}, values);
+  };
+  turn(0, 100);
+  follow();
+  turn(1, 200);
+  turn(1, 400);
+  follow();
+  REQUIRE(robot.rewrite("arm", between(300, 400), {{at(350), along_x(3)}}));
+  turn(5, late);
+  follow();
+  for (std::int64_t t = 100; t <= 350; t += 5) {
+    const auto X = robot.lookup("base", "arm", query(t));
+    const auto Y = mirror.lookup("base", "arm", query(t));
+    INFO("at " << t << ": " << outcome(X) << " and " << outcome(Y));
+    REQUIRE(X);
+    REQUIRE(Y);
+    CHECK(transform_diff(*Y, *X, 1e-9) == "");
+  }
+}
+
 TEST_CASE("who begins to watch before a rewrite has all of the other history after it") {
   Slam slam;
   for (int i = 0; i < 10; ++i) slam.sample(100 * i, along_x(i));
@@ -244,6 +287,39 @@ TEST_CASE("who begins to watch before a rewrite has all of the other history aft
   REQUIRE(slam.forest.rewrite("odom", between(300, 400), {{at(350), along_x(7)}}));
   const auto values = slam.forest.values_since(cursors, {}).values;
   CHECK(values.size() == 9);
+}
+
+TEST_CASE("who watches a rewrite knows as well which stamp the owner has made up") {
+  Forest owner([] { return at(500); });
+  Forest mirror;
+  for (Forest* forest : {&owner, &mirror}) {
+    REQUIRE(forest->add("world", "", {}));
+    REQUIRE(forest->add("odom", "world", along_x(0)));
+    REQUIRE(forest->set_default_timing(long_timing()));
+  }
+  std::vector<EdgeCursor> cursors{{"odom", "world"}};
+  const auto follow = [&] {
+    auto values = owner.values_since(cursors, {}).values;
+    join_histories(values);
+    mirror.take({*mirror.find("odom")}, values);
+  };
+  REQUIRE(owner.update("odom", along_x(0), at(100)));
+  follow();
+  REQUIRE(owner.update("odom", along_x(1), at(200)));
+  follow();
+  REQUIRE(owner.update("odom", along_x(2)));  // arrives at 500
+  REQUIRE(owner.update("odom", along_x(3), at(510)));
+  REQUIRE(owner.rewrite("odom", between(150, 250), {{at(220), along_x(7)}}));
+  follow();
+  Query beyond = query(515);
+  beyond.extrapolate = 1s;
+  CHECK(outcome(owner.lookup("world", "odom", beyond)) == "not_yet");
+  CHECK(outcome(mirror.lookup("world", "odom", beyond)) == "not_yet");
+  REQUIRE(owner.update("odom", along_x(4), at(520)));
+  follow();
+  beyond.at = at(525);
+  CHECK(outcome(owner.lookup("world", "odom", beyond)) == "ok");
+  CHECK(outcome(mirror.lookup("world", "odom", beyond)) == "ok");
 }
 
 TEST_CASE("what an earlier process has left does not reach into a rewritten history") {
