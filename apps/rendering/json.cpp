@@ -109,10 +109,16 @@ json frame_json(const Frame& frame) {
 
 json partition_json(const PartitionInfo& partition) {
   json object{{"name", partition.name},
-              {"host", partition.host},
-              {"pid", partition.pid},
+              {"host", nullptr},
+              {"pid", nullptr},
               {"frames", partition.frames},
               {"reachable", partition.reachable}};
+  if (!partition.host.empty()) {
+    object["host"] = partition.host;
+    object["pid"] = partition.pid;
+  } else if (!partition.reachable) {
+    object["frames"] = nullptr;  // it was lost before this process started
+  }
   if (!partition.program.empty()) object["program"] = partition.program;
   object["protocol"] = to_string(partition.protocol);
   if (partition.clock) object["clock"] = to_string(*partition.clock);

@@ -16,8 +16,8 @@
 namespace tfdude {
 
 /// Asks owners for the frames that this participant needs, and does not keep (Options::follow).
-/// Each owner knows all frames, so any of them may answer; but one that has started after another was
-/// lost does not know the frames of that. So what is missing is asked of all.
+/// Each owner knows all frames, so any of them may answer; but one that has started after another
+/// was lost does not know the frames of that. So what is missing is asked of all.
 /// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
 class OnDemand {
  public:

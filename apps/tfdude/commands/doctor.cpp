@@ -12,9 +12,13 @@ namespace {
 using nlohmann::json;
 
 json met_json(const Met& met) {
-  json object{{"partition", met.partition.name}, {"host", met.partition.host},
-              {"pid", met.partition.pid},        {"reachable", met.partition.reachable},
+  json object{{"partition", met.partition.name}, {"host", nullptr},
+              {"pid", nullptr},                  {"reachable", met.partition.reachable},
               {"clock_ahead_s", nullptr},        {"clock_error_s", nullptr}};
+  if (!met.partition.host.empty()) {
+    object["host"] = met.partition.host;
+    object["pid"] = met.partition.pid;
+  }
   if (met.partition.reachable) {
     object["in_memory"] = met.partition.in_memory;
     object["why_not_in_memory"] = met.partition.why_not_in_memory;

@@ -122,10 +122,10 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   CHECK_FALSE(replaced(2));  // of another partition
   CHECK_FALSE(replaced(3));
   CHECK_FALSE(replaced(4));  // unknown
-  // Also if that one has left again.
+  // The later process has left again.
   one.peers.left(prefix_of(3));
   CHECK(replaced(1));
-  // It was only paused.
+  // The earlier one was only paused.
   one.peers.present(prefix_of(1), presence_of("arms"), 0);
   CHECK_FALSE(replaced(1));
 }
