@@ -250,6 +250,7 @@ void Directory::drop_structure(Known& partition, Owner owner) {
   }
   partition.pages.clear();
   partition.items = 0;
+  partition.awaited.clear();
   partition.successor.reset();
   partition.page_count = 0;
 }
