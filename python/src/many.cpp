@@ -254,29 +254,36 @@ void bind_trajectory(py::module_& module) {
       });
 }
 
+/// Of datetime64: numpy does not tell if an instant cannot be counted in nanoseconds.
+void check_years(const py::array& dates) {
+  using Years = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+  const Years years(dates.attr("astype")("datetime64[Y]").attr("view")("int64"));  // from 1970
+  for (py::ssize_t i = 0; i < years.size(); ++i) {
+    const std::int64_t year = years.data()[i];
+    if (year >= 1678 - 1970 && year <= 2261 - 1970) continue;
+    const bool is_time = year != std::numeric_limits<std::int64_t>::min();  // how numpy has NaT
+    throw py::value_error("instant " + std::to_string(i) +
+                          (is_time ? " is out of range" : " is NaT: not a time"));
+  }
+}
+
 /// The numbers of an array as instants; empty: it has others.
 std::optional<std::vector<Time>> of_array(py::handle at) {
   if (!py::isinstance<py::array>(at)) return std::nullopt;
   auto array = py::reinterpret_borrow<py::array>(at);
   if (array.ndim() != 1) return std::nullopt;
   char kind = array.dtype().kind();
-  bool dated = false;
-  if (kind == 'M') {
-    array = array.attr("astype")("datetime64[ns]").attr("view")("int64");
-    kind = 'i';
-    dated = true;
-  }
   const auto count = static_cast<std::size_t>(array.shape(0));
   std::vector<Time> instants(count);
+  if (kind == 'M') {
+    check_years(array);
+    array = array.attr("astype")("datetime64[ns]").attr("view")("int64");
+    kind = 'i';
+  }
   if (kind == 'i' || kind == 'u') {
     const auto ns = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(array);
-    for (std::size_t i = 0; i < count; ++i) {
-      // How numpy has NaT.
-      if (dated && ns.data()[i] == std::numeric_limits<std::int64_t>::min()) {
-        throw py::value_error("instant " + std::to_string(i) + " is NaT: not a time");
-      }
-      instants[i] = time_of(ns.data()[i]);
-    }
+    std::transform(ns.data(), ns.data() + count, instants.begin(),
+                   [](std::int64_t t) { return time_of(t); });
     return instants;
   }
   if (kind != 'f') return std::nullopt;

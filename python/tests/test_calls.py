@@ -66,6 +66,9 @@ def test_trajectory(network, car):
         for unit in ("ns", "us", "s"):
             with pytest.raises(ValueError, match="instant 3 is NaT"):
                 car.trajectory("odom", "base", dates.astype(f"datetime64[{unit}]"))
+        for far in ("1500-01-01", "2500-01-01"):
+            with pytest.raises(ValueError, match="instant 1 is out of range"):
+                car.trajectory("odom", "base", np.array(["2020-01-01", far], "datetime64[s]"))
         seconds = car.trajectory("odom", "base", stamps[20:25] / 1e9)
         assert np.allclose(seconds.poses[:, 0], np.arange(5) / 10, atol=1e-4)
         assert len(car.trajectory("odom", "base", [])) == 0

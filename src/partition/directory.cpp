@@ -9,9 +9,12 @@
 namespace tfdude {
 namespace {
 
+// Of a page in force.
 std::size_t items_of(const Page& page) {
   return 1 + page.entries.size() + page.tombstones.size() + page.joints.size();
 }
+
+std::size_t items_of_all(const Page& page) { return items_of(page) + page.others.size(); }
 
 }  // namespace
 
@@ -35,16 +38,16 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
 }
 
 bool Directory::has_room_for(const Known& partition, const Page& page) const {
-  std::size_t items = items_of(page);
+  std::size_t items = items_of_all(page);
   for (const Known& one : partitions_) {
-    items += one.items + (one.successor ? one.successor->items : 0);
+    items += one.items + one.awaited.size() + (one.successor ? one.successor->items : 0);
   }
   if (items <= most_items_) return true;
   // The page may replace one.
   std::size_t before = 0;
   if (partition.successor && partition.successor->incarnation == page.incarnation) {
     const auto there = partition.successor->pages.find(page.number);
-    if (there != partition.successor->pages.end()) before = items_of(there->second);
+    if (there != partition.successor->pages.end()) before = items_of_all(there->second);
   } else if (partition.incarnation == page.incarnation) {
     const auto there = partition.pages.find(page.number);
     if (there != partition.pages.end()) before = there->second.items;
@@ -54,20 +57,26 @@ bool Directory::has_room_for(const Known& partition, const Page& page) const {
 
 void Directory::refuse(const std::string& partition) {
   ++refused_;
-  const auto number = number_of(partition);
-  // One that is not known has no place where this could be noted.
-  if (!number) {
-    if (refused_ == 1) cut_.push_back(partition);
-    return;
+  // There is no place where this could be noted of a partition that is not known.
+  if (refused_ == 1) cut_.push_back(partition);
+}
+
+void Directory::leave_out(Known& partition, const Page& page) {
+  ++refused_;
+  // An earlier incarnation is replaced as a whole.
+  if (page.incarnation != partition.live) return;
+  auto& left_out = partition.left_out;
+  if (std::exchange(partition.cut, partition.live) != partition.live) {
+    left_out.clear();
+    cut_.push_back(page.partition);
   }
-  Known& known = partitions_[*number];
-  if (std::exchange(known.cut, known.live) != known.live) cut_.push_back(partition);
+  const bool is_known = std::count(left_out.begin(), left_out.end(), page.number) > 0;
+  if (!is_known && left_out.size() < kMostLeftOut) left_out.push_back(page.number);
 }
 
 bool Directory::is_cut(std::string_view partition) const {
   const auto number = number_of(partition);
-  return number && partitions_[*number].cut != 0 &&
-         partitions_[*number].cut == partitions_[*number].live;
+  return number && partitions_[*number].is_cut();
 }
 
 // The pages of a new incarnation, collected beside the current ones; null if the current ones need
@@ -157,13 +166,17 @@ void Directory::apply(const Page& page) {
     came_back(partition, owner);
   }
   Successor* successor = succeed(partition, page.incarnation);
-  if (!has_room_for(partition, page)) return refuse(page.partition);
+  if (!has_room_for(partition, page)) return leave_out(partition, page);
+  if (auto& left_out = partition.left_out;
+      page.incarnation == partition.cut && left_out.size() < kMostLeftOut) {
+    left_out.erase(std::remove(left_out.begin(), left_out.end(), page.number), left_out.end());
+  }
   if (successor != nullptr) {
     if (page.incarnation < successor->incarnation) return;
     Page& kept = successor->pages[page.number];
     // Of a page that was not there before, nothing is subtracted.
-    if (!kept.partition.empty()) successor->items -= items_of(kept);
-    successor->items += items_of(page);
+    if (!kept.partition.empty()) successor->items -= items_of_all(kept);
+    successor->items += items_of_all(page);
     kept = page;
     replace_if_complete(partition, owner);
   } else {
@@ -254,7 +267,7 @@ void Directory::note_epoch(Known& partition, const Page& page) {
     partition.awaited = page.others;
   }
   const bool all_there =
-      partition.pages.size() >= partition.page_count &&
+      partition.pages.size() >= partition.page_count && !partition.is_cut() &&
       std::all_of(partition.awaited.begin(), partition.awaited.end(), [&](const PageEpoch& one) {
         const auto there = partition.pages.find(one.number);
         return there != partition.pages.end() && there->second.epoch >= one.epoch;

@@ -41,12 +41,13 @@ class Directory {
 
   /// How many names of partitions are kept at most.
   static constexpr std::size_t kMaxPartitions = 4096;
-  /// How much of the pages of others is kept at most: their entries, tombstones and joints, and one
-  /// more for each page. Pages beyond are dropped, so that their partitions stay incomplete.
+  /// How much of the pages of others is kept at most: their entries, tombstones and joints, one
+  /// more for each page, and what is kept of the pages that they name. Pages beyond are dropped, so
+  /// that their partitions stay incomplete until these pages come again.
   void limit_others(std::size_t items) { most_items_ = items; }
   /// Messages of others that were dropped because of these limits.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
-  /// Whether pages of that partition were, since its latest process is known.
+  /// Whether pages of that partition's latest process were, and have not come again.
   [[nodiscard]] bool is_cut(std::string_view partition) const;
   /// Partitions whose messages were dropped for the first time since the last call.
   [[nodiscard]] std::vector<std::string> take_cut() { return std::exchange(cut_, {}); }
@@ -215,6 +216,7 @@ class Directory {
   [[nodiscard]] bool announced(std::string_view partition) const;
 
  private:
+  static constexpr std::size_t kMostLeftOut = 64;
   using PageMap = std::map<std::uint32_t, Page>;
   using Ids = std::unordered_set<std::string_view>;
 
@@ -248,7 +250,9 @@ class Directory {
     std::map<std::uint32_t, KeptPage> pages;
     std::size_t items = 0;  // of the pages
     std::optional<Successor> successor;
-    std::uint64_t cut = 0;       // the incarnation of which pages were dropped
+    std::uint64_t cut = 0;  // the latest incarnation of which pages were dropped
+    // Of these the last versions were dropped; if there are kMostLeftOut, perhaps those of others.
+    std::vector<std::uint32_t> left_out;
     std::uint64_t heard_of = 0;  // the latest incarnation mentioned by others
     bool forgotten = false;      // up to heard_of
     // Up to this incarnation, once the partition is unreachable here, too.
@@ -267,7 +271,10 @@ class Directory {
     [[nodiscard]] bool outdated(std::uint64_t one) const {
       return one < live || one < heard_of || (forgotten && one == heard_of);
     }
-    [[nodiscard]] bool complete() const { return !successor && pages.size() >= page_count; }
+    [[nodiscard]] bool is_cut() const { return cut == live && !left_out.empty(); }
+    [[nodiscard]] bool complete() const {
+      return !successor && pages.size() >= page_count && !is_cut();
+    }
   };
 
   Known& known(const std::string& partition, Owner& owner);
@@ -277,6 +284,7 @@ class Directory {
   }
   [[nodiscard]] bool has_room_for(const Known& partition, const Page& page) const;
   void refuse(const std::string& partition);
+  void leave_out(Known& partition, const Page& page);
   [[nodiscard]] std::optional<Owner> number_of(std::string_view partition) const;
   void hear_absent(Owner from, const Presence& presence);
   void hear_of(const Absent& one, const std::string& teller);

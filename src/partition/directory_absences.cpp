@@ -109,7 +109,8 @@ void Directory::hear_absent(Owner from, const Presence& presence) {
   if (!same_process) absences_.teller_restarted(teller);
   absences_.replace_reports(presence.absent, teller);
   for (const Absent& one : presence.absent) {
-    if (!has_room_for(one.partition)) {
+    // One presence can name thousands, which would leave no room for those that are there.
+    if (partitions_.size() >= kMaxPartitions / 2 && !number_of(one.partition)) {
       refuse(one.partition);
       continue;
     }
@@ -250,6 +251,7 @@ void Directory::drop_structure(Known& partition, Owner owner) {
   }
   partition.pages.clear();
   partition.items = 0;
+  partition.awaited.clear();
   partition.successor.reset();
   partition.page_count = 0;
 }

@@ -3,6 +3,14 @@
 #include <algorithm>
 
 namespace tfdude {
+namespace {
+
+// A page is also published again before so many pages have been published after it, and as many as
+// there are. With up to 32,768 pages, 1.9 million frames, that is not more than a HEARTBEAT may
+// span (rtps_check.hpp).
+constexpr std::uint32_t kMostRepeatWithin = 32'768;
+
+}  // namespace
 
 // Rather a page that is published anyway.
 std::uint32_t Pages::page_with_room() {
@@ -142,7 +150,8 @@ void Pages::list_others(Page& page) const {
 void Pages::repeat_old_pages() {
   if (pages_.empty()) return;
   since_repeat_ += static_cast<std::uint32_t>(changed_.size());
-  const std::uint32_t period = std::max(kRepeatWithin / count(), 8U);
+  const std::uint32_t period =
+      std::max({kRepeatWithin / count(), std::min(kMostRepeatWithin / count(), 8U), 1U});
   while (since_repeat_ >= period) {
     since_repeat_ -= period;
     repeat_next_ = (repeat_next_ + 1) % count();

@@ -231,17 +231,19 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
     return push_checked(newest, {X_PC}, stamp);
   }
   const std::uint64_t place = newest.samples->place_of(stamp);
-  if (place < newest.samples->next() && newest.samples->stamp(place) == stamp) {
-    const Sample& there = *newest.samples->sample(place);
-    if (is_between(there)) return give_between(newest, there, value.X_PC.pose);
+  const bool there = place < newest.samples->next() && newest.samples->stamp(place) == stamp;
+  if (there && is_between(*newest.samples->sample(place))) {
+    return give_between(newest, *newest.samples->sample(place), value.X_PC.pose);
   }
-  const Sample& before = *newest.samples->sample(newest.number);
+  // As if a late value had come in time: what was observed later tells nothing of it. One before
+  // all others leads to the first of them.
+  const bool follows = !there && place > newest.samples->oldest();
+  const Sample& other = *newest.samples->sample(follows ? place - 1 : place);
   const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
-  // A late value counts as no more certain than the newest one.
-  const double seconds = std::max(static_cast<double>(stamp - newest.stamp) * 1e-9, 0.0);
+  const double seconds = std::abs(static_cast<double>(stamp - other.stamp)) * 1e-9;
   const Pose& G_PC = value.X_PC.pose;
   const CorrelatedValue next =
-      drifted(before, said, G_PC, newest.samples->timing().process_noise, seconds);
+      drifted(other, said, G_PC, newest.samples->timing().process_noise, seconds);
   const SampleRevision revision{{G_PC, {}}, next.correlation};
   const std::uint32_t slot = newest.slot;
   push_checked(newest, {next.X_PC, nullptr, &revision}, stamp);

@@ -71,13 +71,10 @@ void FairShare::spent(Sender sender, Clock::duration time, Clock::time_point now
   const Lock lock(mutex_);
   const auto [there, is_new] = accounts_.try_emplace(sender, Account{0, now});
   Account& account = there->second;
-  bool counts = load.has_message;
-  if (!counts) {
-    const double passed = std::chrono::duration<double>(now - account.at).count();
-    account.allowance = std::min(kAllowance, account.allowance + passed * kAllowanceGrowth);
-    counts = account.allowance < seconds;
-    if (!counts) account.allowance -= seconds;
-  }
+  const double passed = std::chrono::duration<double>(now - account.at).count();
+  account.allowance = std::min(kAllowance, account.allowance + passed * kAllowanceGrowth);
+  const bool counts = load.has_message || account.allowance < seconds;
+  if (!counts) account.allowance -= seconds;
   account.seconds = account.now(now) + (counts ? seconds : 0);
   account.at = now;
   if (counts) account.active = now;

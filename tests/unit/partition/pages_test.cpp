@@ -212,6 +212,30 @@ TEST_CASE("a page that does not change is published again from time to time") {
   CHECK(static_cast<double>(number) <= 20'000 * (1 + 2.0 * pages.count() / Pages::kRepeatWithin));
 }
 
+TEST_CASE("the pages of a large partition stay within what a heartbeat may span") {
+  constexpr std::uint32_t kLongestSpan = 65'536;  // fastdds::kLongestRange
+  Pages pages("robot", kLife);
+  int frames = 0;
+  while (pages.count() < 10'000) pages.put("f" + std::to_string(frames++), "", 1);
+  std::vector<std::uint32_t> published(pages.count());  // the number of the last publication
+  std::uint32_t number = 0;
+  std::uint32_t longest = 0;
+  const auto publish = [&] {
+    for (const Page& page : pages.take_changed()) {
+      longest = std::max(longest, number - published[page.number]);
+      published[page.number] = ++number;
+    }
+  };
+  publish();
+  for (int change = 0; change < 90'000; ++change) {
+    pages.put("f0", "", 2);
+    pages.close_epoch();
+    publish();
+  }
+  CHECK(longest < kLongestSpan);
+  CHECK(number - *std::min_element(published.begin(), published.end()) < kLongestSpan);
+}
+
 TEST_CASE("a replica that receives the pages in order has the owner's structure") {
   Random random(0x9a6e5);
   INFO("seed " << random.seed());

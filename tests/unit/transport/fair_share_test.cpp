@@ -85,6 +85,17 @@ TEST_CASE("fair share: what is no message has an allowance") {
   }
 }
 
+TEST_CASE("fair share: the allowance grows beside messages, too") {
+  Thread thread;
+  constexpr auto kEach = 20us;
+  for (int i = 0; i < 50'000; ++i) (void)thread.handle(kFlood, kEach, 1us, false);  // it is spent
+  for (int i = 0; i < 10'000; ++i) CHECK(thread.handle(kFlood, kEach, 1ms));        // for 10 s
+  for (int i = 0; i < 40'000; ++i) {
+    CHECK(thread.handle(kFlood, kEach, 1us, false));
+    if (i % 100 == 0) CHECK(thread.handle(kOther, kEach, 1us));
+  }
+}
+
 TEST_CASE("fair share: a flood of ever new senders takes no memory, and forgets no flood") {
   Thread thread;
   for (FairShare::Sender i = 0; i < 100'000; ++i) {

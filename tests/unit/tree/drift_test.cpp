@@ -338,4 +338,41 @@ TEST_CASE("drift: beyond the newest sample the error goes on from there") {
   CHECK(X->pose.translation().x() == Approx(newest->pose.translation().x() + 0.3));
 }
 
+TEST_CASE("drift: a pose from before an observation is as certain late as in time") {
+  Drifting late;
+  Drifting in_time;
+  const auto drive = [](Drifting& robot, int step) {
+    robot.G = shift(0.1 * step);
+    robot.drive(step);
+  };
+  constexpr int kLate = 5;
+  for (int step = 0; step <= 10; ++step) {
+    if (step != kLate) drive(late, step);
+    drive(in_time, step);
+  }
+  const Covariance R = of_deviations(1e-3, 1e-3);
+  for (Drifting* robot : {&late, &in_time}) {
+    REQUIRE(robot->forest.update("object", {shift(2), R}));
+    REQUIRE(robot->see({shift(1.1), R}, 10, "observed:a"));
+  }
+  drive(late, kLate);
+  for (int step = 0; step <= 10; ++step) {
+    INFO("step " << step);
+    for (const auto& [a, b] : {std::pair("world", "base"), std::pair("base", "object")}) {
+      CHECK(late.sigma(a, b, step) == Approx(in_time.sigma(a, b, step)));
+      const auto X = late.forest.lookup(a, b, when(step)).value();
+      const auto Y = in_time.forest.lookup(a, b, when(step)).value();
+      CHECK((X.pose.translation() - Y.pose.translation()).norm() < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("drift: a pose from before the first one is less certain than that") {
+  Drifting robot;
+  for (const int step : {2, 3}) robot.drive(step);
+  const double first = robot.sigma("world", "base", 2);
+  robot.drive(1);
+  CHECK(robot.sigma("world", "base", 1) == Approx(std::hypot(first, 0.02 * std::sqrt(kStep))));
+}
+
 }  // namespace tfdude
