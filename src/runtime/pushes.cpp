@@ -94,11 +94,7 @@ Result<PushedValues> Pushes::watch(std::uint64_t group, const WatchRequest& requ
 }
 
 void Pushes::await_arrival(Group& group) {
-  if (!group.watched.has_rewritten()) {
-    group.watched.arrived();
-  } else if (!group.arrives) {
-    group.arrives = sink_.now() + kArrival;
-  }
+  if (group.watched.has_rewritten() && !group.arrives) group.arrives = sink_.now() + kArrival;
 }
 
 void Pushes::tell_all(std::uint64_t group) {

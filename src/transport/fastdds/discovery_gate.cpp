@@ -131,8 +131,10 @@ class GatedTransport final : public SendFilter {
     if (!pass) return;
     descriptor_.life_signs->heard(bytes, size, now);
     descriptor_.acknowledgements->heard(bytes, size);
-    FairShare::begin(now);
-    handle(next, bytes, size, local, remote, now);
+    // The sender is not to blame if the gate was shut.
+    const auto begin = FairShare::Clock::now();
+    FairShare::begin(begin);
+    handle(next, bytes, size, local, remote, begin);
     FairShare::end(FairShare::Clock::now());
   }
 
