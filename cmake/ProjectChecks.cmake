@@ -5,9 +5,14 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter)
 add_test(NAME "layers: sources" COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py)
 add_test(NAME "layers: the check itself"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_layers.py --self-test)
+add_test(NAME "unity: names that files of a folder share"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_unity.py)
+add_test(NAME "unity: the check itself"
+  COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/check_unity.py --self-test)
 add_test(NAME "words: prose and identifiers"
   COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/scripts/check_words.py)
-set_tests_properties("layers: sources" "layers: the check itself" "words: prose and identifiers"
+set_tests_properties("layers: sources" "layers: the check itself" "unity: names that files of a folder share"
+  "unity: the check itself" "words: prose and identifiers"
   PROPERTIES LABELS unit TIMEOUT 60)
 
 # Checks that another vendor's compiler accepts the IDL; to it, names that differ only in case are the same name. It

@@ -11,7 +11,7 @@ namespace tfdude {
 namespace {
 
 // How long to wait for one owner before another one is asked.
-constexpr Milliseconds kPatience{250};
+constexpr Milliseconds kPatienceWithOwner{250};
 
 // Pauses while no owner can answer yet.
 constexpr Milliseconds kFirstPause{1};
@@ -116,7 +116,7 @@ Result<std::vector<KnownFrame>> OnDemand::ask_one(Owner owner, const FramesReque
     parts.push_back(*std::move(part));
   }
   const auto asked = Clock::now();
-  Reply reply = std::move(links_.ask(parts, deadline.within(kPatience)).front());
+  Reply reply = std::move(links_.ask(parts, deadline.within(kPatienceWithOwner)).front());
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
   auto* answer = std::get_if<std::vector<KnownFrame>>(&reply.body);
   if (answer == nullptr) {
