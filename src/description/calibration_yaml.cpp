@@ -12,7 +12,7 @@
 namespace tfdude {
 namespace {
 
-class Reader : public YamlFields {
+class CalibrationReader : public YamlFields {
  public:
   using YamlFields::YamlFields;
 
@@ -40,7 +40,7 @@ FileEdge edge(std::string child, std::string parent, const Pose& X_PC, int line)
 }
 
 // A homogeneous matrix: four rows of four numbers, or the 16 numbers in one list.
-Result<Pose> Reader::matrix(const Field& field, const std::string& what) const {
+Result<Pose> CalibrationReader::matrix(const Field& field, const std::string& what) const {
   const YAML::Node& rows = field.value;
   const bool flat = rows.IsSequence() && rows.size() == 16;
   if (!flat && (!rows.IsSequence() || rows.size() != 4)) {
@@ -145,7 +145,7 @@ class KalibrChain {
   std::vector<FileEdge> edges_;
 };
 
-FileEdges Reader::kalibr(const YAML::Node& root) const {
+FileEdges CalibrationReader::kalibr(const YAML::Node& root) const {
   const auto entries = fields(root, "the file");
   if (!entries) return tl::unexpected(entries.error());
   KalibrChain chain;
@@ -173,13 +173,13 @@ FileEdges Reader::kalibr(const YAML::Node& root) const {
   return std::move(chain).edges();
 }
 
-Result<std::string> Reader::frame(const Fields& entries, const char* key) const {
+Result<std::string> CalibrationReader::frame(const Fields& entries, const char* key) const {
   const auto found = entries.find(key);
   if (found == entries.end()) return fail(Errc::kConfig, name() + ": " + key + " is missing");
   return text(found->second, key);
 }
 
-Result<bool> Reader::on_hand(const Fields& entries, const YAML::Node& node) const {
+Result<bool> CalibrationReader::on_hand(const Fields& entries, const YAML::Node& node) const {
   const auto type = entries.find("calibration_type");
   const auto flag = entries.find("eye_on_hand");
   if (type == entries.end() && flag == entries.end()) {
@@ -200,9 +200,10 @@ Result<bool> Reader::on_hand(const Fields& entries, const YAML::Node& node) cons
 }
 
 template <std::size_t N>
-Result<std::array<double, N>> Reader::parts(const Fields& entries, const YAML::Node& node,
-                                            const std::array<const char*, N>& keys,
-                                            const std::string& what) const {
+Result<std::array<double, N>> CalibrationReader::parts(const Fields& entries,
+                                                       const YAML::Node& node,
+                                                       const std::array<const char*, N>& keys,
+                                                       const std::string& what) const {
   std::array<double, N> numbers{};
   for (std::size_t i = 0; i < N; ++i) {
     const auto found = entries.find(keys[i]);
@@ -216,7 +217,7 @@ Result<std::array<double, N>> Reader::parts(const Fields& entries, const YAML::N
 }
 
 // The transform is the pose of the tracking system's frame in the robot's hand or base.
-FileEdges Reader::hand_eye(const YAML::Node& root) const {
+FileEdges CalibrationReader::hand_eye(const YAML::Node& root) const {
   const auto top = fields(root, "the file");
   if (!top) return tl::unexpected(top.error());
   auto said = *top;  // early versions have the parameters beside the transformation
@@ -264,7 +265,8 @@ FileEdges Reader::hand_eye(const YAML::Node& root) const {
       edge(*std::move(child), *std::move(parent), *pose, node.Mark().line + 1)};
 }
 
-Result<Eigen::MatrixXd> Reader::opencv_matrix(const Fields& entries, const char* key) const {
+Result<Eigen::MatrixXd> CalibrationReader::opencv_matrix(const Fields& entries,
+                                                         const char* key) const {
   const auto found = entries.find(key);
   const std::string what = key;
   if (found == entries.end()) return fail(Errc::kConfig, name() + ": " + what + " is missing");
@@ -295,7 +297,7 @@ Result<Eigen::MatrixXd> Reader::opencv_matrix(const Fields& entries, const char*
 }
 
 // R and T are the pose of the first camera in the second.
-FileEdges Reader::opencv(const YAML::Node& root) const {
+FileEdges CalibrationReader::opencv(const YAML::Node& root) const {
   const auto entries = fields(root, "the file");
   if (!entries) return tl::unexpected(entries.error());
   const auto R = opencv_matrix(*entries, "R");
@@ -313,8 +315,8 @@ FileEdges Reader::opencv(const YAML::Node& root) const {
 }
 
 FileEdges read(const std::string& text, const std::string& name,
-               FileEdges (Reader::*member)(const YAML::Node&) const) {
-  const Reader reader(name);
+               FileEdges (CalibrationReader::*member)(const YAML::Node&) const) {
+  const CalibrationReader reader(name);
   FileEdges edges;
   auto ok = reader.read_document(text, [&](const YAML::Node& root) -> Result<void> {
     edges = (reader.*member)(root);
@@ -327,18 +329,18 @@ FileEdges read(const std::string& text, const std::string& name,
 }  // namespace
 
 FileEdges read_kalibr(const std::string& text, const std::string& name) {
-  return read(text, name, &Reader::kalibr);
+  return read(text, name, &CalibrationReader::kalibr);
 }
 
 FileEdges read_hand_eye(const std::string& text, const std::string& name) {
-  return read(text, name, &Reader::hand_eye);
+  return read(text, name, &CalibrationReader::hand_eye);
 }
 
 FileEdges read_opencv(const std::string& text, const std::string& name) {
   // "%YAML:1.0" is no directive of YAML; as a comment it keeps the numbers of lines.
   std::string yaml = text;
   if (!yaml.empty() && yaml.front() == '%') yaml.front() = '#';
-  return read(yaml, name, &Reader::opencv);
+  return read(yaml, name, &CalibrationReader::opencv);
 }
 
 }  // namespace tfdude

@@ -30,7 +30,7 @@ constexpr std::array<std::string_view, 7> kHistoryKeys = {
     "span", "count", "process_noise", "drifts", "moving", "max_ahead", "restart_after"};
 
 // Reads the configuration file of a daemon.
-class Reader : public YamlFields {
+class ConfigReader : public YamlFields {
  public:
   using YamlFields::YamlFields;
 
@@ -50,8 +50,8 @@ class Reader : public YamlFields {
   [[nodiscard]] Result<void> urdfs(const Field& field, Config& config) const;
 };
 
-Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
-                               std::chrono::nanoseconds& out) const {
+Result<void> ConfigReader::max_ahead(const Fields& entries, const std::string& what,
+                                     std::chrono::nanoseconds& out) const {
   const auto found = entries.find("max_ahead");
   if (found == entries.end()) return {};
   const YAML::Node& value = found->second.value;
@@ -71,8 +71,8 @@ Result<void> Reader::max_ahead(const Fields& entries, const std::string& what,
 }
 
 // Keys that are left out keep their values of `timing`.
-Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
-                                   EdgeTiming timing) const {
+Result<EdgeTiming> ConfigReader::history(const Field& field, const std::string& place,
+                                         EdgeTiming timing) const {
   const std::string what = place + ": history";
   const auto entries = fields(field.value, kHistoryKeys, what);
   if (!entries) return tl::unexpected(entries.error());
@@ -115,8 +115,8 @@ Result<EdgeTiming> Reader::history(const Field& field, const std::string& place,
 
 // Reads a list of columns. Each is the edge's error for one standard deviation of one dimension of
 // the source.
-Result<CommonError> Reader::common_error(const std::string& source, const Field& field,
-                                         const std::string& place) const {
+Result<CommonError> ConfigReader::common_error(const std::string& source, const Field& field,
+                                               const std::string& place) const {
   const std::string what = place + ": source " + tfdude::quote(source);
   CommonError common_error{source, false, {}};
   if (!field.value.IsSequence() || field.value.size() == 0) {
@@ -145,7 +145,8 @@ Result<CommonError> Reader::common_error(const std::string& source, const Field&
                what + ": names with this prefix are reserved for observations");
 }
 
-Result<Correlation> Reader::correlation(const Fields& entries, const std::string& place) const {
+Result<Correlation> ConfigReader::correlation(const Fields& entries,
+                                              const std::string& place) const {
   Correlation correlation;
   if (const auto found = entries.find("correlation"); found != entries.end()) {
     const auto said = text(found->second, place + ": correlation");
@@ -169,7 +170,7 @@ Result<Correlation> Reader::correlation(const Fields& entries, const std::string
 }
 
 // `config` has the defaults, and the frames read so far.
-Result<FrameSpec> Reader::frame(const YAML::Node& node, const Config& config) const {
+Result<FrameSpec> ConfigReader::frame(const YAML::Node& node, const Config& config) const {
   const std::string nth = "frames[" + std::to_string(config.frames.size()) + "]";
   // Messages about a bad key also name the frame, if its id can be read.
   const auto is_id = [](const auto& entry) {
@@ -211,7 +212,7 @@ Result<FrameSpec> Reader::frame(const YAML::Node& node, const Config& config) co
   return spec;
 }
 
-Result<Config> Reader::config(const YAML::Node& root) const {
+Result<Config> ConfigReader::config(const YAML::Node& root) const {
   const auto entries = fields(root, kFileKeys, "the file");
   if (!entries) return tl::unexpected(entries.error());
   Config config;
@@ -253,7 +254,7 @@ Result<Config> Reader::config(const YAML::Node& root) const {
   return config;
 }
 
-Result<void> Reader::frames(const Field& field, Config& config) const {
+Result<void> ConfigReader::frames(const Field& field, Config& config) const {
   const YAML::Node& list = field.value;
   if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "frames is not a list");
   std::unordered_map<std::string, int> line_of;
@@ -272,7 +273,7 @@ Result<void> Reader::frames(const Field& field, Config& config) const {
   return check_no_cycle(config);
 }
 
-Result<void> Reader::urdfs(const Field& field, Config& config) const {
+Result<void> ConfigReader::urdfs(const Field& field, Config& config) const {
   const YAML::Node& list = field.value;
   if (!list.IsSequence()) return error(Errc::kConfig, field.mark, "urdf is not a list");
   const UrdfFields reader(name(), std::filesystem::path(name()).parent_path().string(),
@@ -292,7 +293,7 @@ Result<void> Reader::urdfs(const Field& field, Config& config) const {
 }  // namespace
 
 Result<Config> parse_config(const std::string& text, const std::string& name) {
-  const Reader reader(name);
+  const ConfigReader reader(name);
   Result<Config> config;
   auto read = reader.read_document(text, [&](const YAML::Node& root) -> Result<void> {
     config = reader.config(root);

@@ -24,9 +24,9 @@ std::string source_of(const std::string& text) {
   return "graph:" + digits + ":";
 }
 
-class Reader {
+class GraphReader {
  public:
-  explicit Reader(const std::string& name) : name_(name) {}
+  explicit GraphReader(const std::string& name) : name_(name) {}
 
   [[nodiscard]] Result<void> read(const std::string& text) {
     TextLines lines(text);
@@ -180,7 +180,7 @@ class Reader {
 }  // namespace
 
 FileEdges read_g2o(const std::string& text, const std::string& name) {
-  Reader reader(name);
+  GraphReader reader(name);
   if (auto ok = reader.read(text); !ok) return tl::unexpected(std::move(ok.error()));
   return reader.edges(text);
 }

@@ -10,7 +10,7 @@
 namespace tfdude {
 namespace {
 
-class Reader : public YamlFields {
+class LaunchReader : public YamlFields {
  public:
   using YamlFields::YamlFields;
 
@@ -107,7 +107,7 @@ class Reader : public YamlFields {
 }  // namespace
 
 Result<std::vector<LaunchStart>> starts_in_yaml(const std::string& text, const std::string& name) {
-  Reader reader(name);
+  LaunchReader reader(name);
   auto ok = reader.read_document(text, [&](const YAML::Node& root) { return reader.read(root); });
   if (!ok) return tl::unexpected(std::move(ok.error()));
   return std::move(reader).starts();

@@ -25,7 +25,7 @@ tl::unexpected<Error> failed(const std::string& path, const char* what, int erro
 
 bool write_all(int descriptor, std::string_view content) {
   while (!content.empty()) {
-    const ssize_t size = write(descriptor, content.data(), content.size());
+    const ssize_t size = ::write(descriptor, content.data(), content.size());
     if (size < 0 && errno == EINTR) continue;
     if (size < 0) return false;
     content.remove_prefix(static_cast<std::size_t>(size));
@@ -45,7 +45,7 @@ Result<void> check_owner(const std::string& path, const struct stat& found) {
 // What was renamed is on the disk only when its directory is.
 void sync_parent(const std::string& path) {
   const std::string parent = std::filesystem::path(path).parent_path();
-  const int descriptor = open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return;
   (void)fsync(descriptor);
   close(descriptor);
@@ -64,7 +64,7 @@ Result<bool> make_directory(const std::string& path) {
 Result<void> write_secret(const std::string& path, std::string_view content) {
   const std::string beside = path + "." + std::to_string(getpid()) + ".tmp";
   const int out =
-      open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, kFileMode);
+      ::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, kFileMode);
   if (out < 0) return failed(beside, "created");
   const bool written = write_all(out, content) && fsync(out) == 0;
   const int error = errno;
@@ -114,7 +114,7 @@ Result<void> check_secret(const std::string& path) {
 }
 
 Result<DirectoryLock> DirectoryLock::take(const std::string& directory) {
-  const int descriptor = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int descriptor = ::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return failed(directory, "opened");
   DirectoryLock lock(descriptor);
   while (flock(descriptor, LOCK_EX) != 0) {

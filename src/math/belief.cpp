@@ -56,7 +56,7 @@ Matrix6d joint_moment(const CommonErrors& first, const CommonErrors& second) {
 
 // Both errors of a product, transported to the last frame: X_AC as if known exactly, and the two
 // errors there.
-struct Errors {
+struct FactorErrors {
   const Covariance& own_1;
   const Covariance& own_2;
   CommonErrors common_errors_1;
@@ -85,7 +85,7 @@ Matrix6d derivative(const kernel::Fourth& terms, std::size_t i) {
 }
 
 // @return the own part of the product
-Covariance add_fourth(Errors&& e, CommonErrors& common_errors) {
+Covariance add_fourth(FactorErrors&& e, CommonErrors& common_errors) {
   const Covariance J_11 = whole(e.own_1, e.common_errors_1);
   const Covariance J_22 = whole(e.own_2, e.common_errors_2);
   Matrix6d J_12;

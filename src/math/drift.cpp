@@ -13,13 +13,13 @@ namespace {
 // Between two samples the noise since the first one has another lever than at the second one. The
 // difference may have negative eigenvalues, which are small beside the whole.
 constexpr double kLever = 1e-3;
-constexpr double kRounding = 1e-9;
+constexpr double kRoundingOfSum = 1e-9;
 constexpr double kNothing = 1e-13;  // of the variance, left by rounding
 
 bool carries_on(const Matrix6d& F, const CommonError& a, const CommonError& b) {
   if (a.source != b.source || a.subtracts != b.subtracts) return false;
   if (a.loading.cols() != b.loading.cols()) return false;
-  return (F * a.loading - b.loading).norm() <= kRounding * b.loading.norm();
+  return (F * a.loading - b.loading).norm() <= kRoundingOfSum * b.loading.norm();
 }
 
 }  // namespace

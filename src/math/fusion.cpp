@@ -15,8 +15,8 @@
 namespace tfdude {
 namespace {
 
-constexpr int kMostIterations = 100;
-constexpr double kConverged = 1e-12;
+constexpr int kMostFusions = 100;
+constexpr double kFusionConverged = 1e-12;
 
 // N(mean, root rootᵀ) of a pose's perturbation.
 struct Gaussian {
@@ -46,7 +46,8 @@ bool merge(Gaussian& sum, const Gaussian& more, double reach) {
 bool is_small(const Gaussian& step, double reach) {
   constexpr double kEnough = 1e-9;
   Twist hidden;
-  hidden << Eigen::Vector3d::Constant(kConverged * reach), Eigen::Vector3d::Constant(kConverged);
+  hidden << Eigen::Vector3d::Constant(kFusionConverged * reach),
+      Eigen::Vector3d::Constant(kFusionConverged);
   const Twist enough = hidden.cwiseMax(kEnough * step.root.rowwise().norm());
   return (step.mean.cwiseAbs().array() <= enough.array()).all();
 }
@@ -77,7 +78,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
   if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
   const double reach = reach_of(estimates);
   Pose X = estimates.front().pose;
-  for (int iteration = 1; iteration <= kMostIterations; ++iteration) {
+  for (int iteration = 1; iteration <= kMostFusions; ++iteration) {
     Gaussian sum = seen_from(X, estimates.front());
     for (std::size_t k = 1; k < estimates.size(); ++k) {
       if (!merge(sum, seen_from(X, estimates[k]), reach)) {

@@ -27,7 +27,7 @@ constexpr double kDoubtful = 2.0;
 constexpr int kIterationsAtOnce = 10;
 
 // Errors of the edges.
-struct Errors {
+struct EdgeErrors {
   Deviations deviations;
   std::vector<Twist> xi;  // of all edges
 };
@@ -96,31 +96,31 @@ class Descent {
     return {at_.xi, linear_, std::move(S), seen, false};
   }
 
-  [[nodiscard]] double cost(const Errors& errors, const Twist& h) const {
+  [[nodiscard]] double cost(const EdgeErrors& errors, const Twist& h) const {
     return prior_.cost(errors.deviations) + compared_->distance_squared(h);
   }
 
-  [[nodiscard]] Errors of(Deviations deviations) const {
-    Errors errors{std::move(deviations), std::vector<Twist>(all_.size(), Twist::Zero())};
+  [[nodiscard]] EdgeErrors of(Deviations deviations) const {
+    EdgeErrors errors{std::move(deviations), std::vector<Twist>(all_.size(), Twist::Zero())};
     const auto xi = prior_.errors(errors.deviations);
     for (std::size_t i = 0; i < xi.size(); ++i) errors.xi[prior_.edges()[i]] = xi[i];
     return errors;
   }
 
   // Where the cost of the linear problem is least.
-  [[nodiscard]] Errors best(const PathMinimum& now) const {
+  [[nodiscard]] EdgeErrors best(const PathMinimum& now) const {
     const Whitening& W = now.S.whitening();
     return of(prior_.most_probable(now.linear.H, W, W * now.seen));
   }
 
   Step descend(const PathMinimum& now) {
-    const Errors whole = best(now);
+    const EdgeErrors whole = best(now);
     const double before = cost(at_, linear_.h);
     const double gain = before - cost(whole, expected(whole, now));
     const bool last = is_small(whole) || gain <= hidden_gain(before);
     double share = 1.0;
     for (int halving = 0; halving < kMostHalvings; ++halving, share *= 0.5) {
-      Errors next = of(between(at_.deviations, whole.deviations, share));
+      EdgeErrors next = of(between(at_.deviations, whole.deviations, share));
       LinearPath linear = linearize(all_, next.xi, Z_AB_);
       if (!last && !(cost(next, linear.h) < before)) continue;
       at_ = std::move(next);
@@ -131,7 +131,7 @@ class Descent {
   }
 
   // h after a step, if the path were linear.
-  [[nodiscard]] Twist expected(const Errors& next, const PathMinimum& now) const {
+  [[nodiscard]] Twist expected(const EdgeErrors& next, const PathMinimum& now) const {
     Twist h = -now.seen;
     for (const std::size_t k : prior_.edges()) h += now.linear.H[k] * next.xi[k];
     return h;
@@ -145,7 +145,7 @@ class Descent {
   }
 
   // Whether the step is below a millionth of the edges' deviations, or of what rounding hides.
-  [[nodiscard]] bool is_small(const Errors& next) {
+  [[nodiscard]] bool is_small(const EdgeErrors& next) {
     if (deviations_.empty()) {
       for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
         deviations_.emplace_back(prior_.marginal(i).rowwise().norm());
@@ -167,7 +167,7 @@ class Descent {
   const Loading& R_;
   Loading noise_;
   Loading path_;  // a root of the path's covariance at ξ = 0
-  Errors at_;
+  EdgeErrors at_;
   LinearPath linear_;
   std::optional<Factor> compared_;
   std::vector<Twist> deviations_;

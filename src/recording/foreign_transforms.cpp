@@ -8,11 +8,11 @@ namespace tfdude::recording {
 namespace {
 
 // Samples that go back by more are from a clock that has jumped back, as in the bridge.
-constexpr std::chrono::seconds kJump{1};
+constexpr std::chrono::seconds kJumpBack{1};
 
 constexpr std::size_t kMostStamps = 2'000'000;
-constexpr std::size_t kLeastOfOneEdge = 64;
-constexpr std::size_t kMostOfOneEdge = 4096;
+constexpr std::size_t kLeastStampsOfEdge = 64;
+constexpr std::size_t kMostStampsOfEdge = 4096;
 
 std::size_t hash_of(const Pose& X) {
   const Eigen::Quaterniond& q = X.rotation();
@@ -60,7 +60,7 @@ bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, Transform
   const auto who = [&] { return "frame " + quote(value.edge.id); };
   Time& stamp = *value.value.stamp;
   const Time newest = edge.seen.empty() ? stamp : edge.seen.back().stamp;
-  if (newest - stamp > kJump) {
+  if (newest - stamp > kJumpBack) {
     ++counts.jumps;
     report(who() + ": time has jumped back by more than a second: its samples before are dropped");
     edge = Edge{edge.parent};
@@ -98,8 +98,9 @@ bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, Transform
 
 // What is older by more than a jump is never asked for.
 void ForeignTransforms::forget_some(Edge& edge) const {
-  const std::size_t most = std::clamp(kMostStamps / edges_.size(), kLeastOfOneEdge, kMostOfOneEdge);
-  while (edge.seen.back().stamp - edge.seen.front().stamp > kJump) edge.seen.pop_front();
+  const std::size_t most =
+      std::clamp(kMostStamps / edges_.size(), kLeastStampsOfEdge, kMostStampsOfEdge);
+  while (edge.seen.back().stamp - edge.seen.front().stamp > kJumpBack) edge.seen.pop_front();
   while (edge.seen.size() > most) {
     edge.forgotten = edge.seen.front().stamp;
     edge.seen.pop_front();

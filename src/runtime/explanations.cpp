@@ -15,7 +15,7 @@ namespace tfdude {
 namespace {
 
 // How long owners are waited for: for people, who then learn which owner is silent.
-constexpr Milliseconds kPatience{80};
+constexpr Milliseconds kPatienceForAnswer{80};
 // Clocks of hosts that differ by more than this are told.
 constexpr std::chrono::milliseconds kClockDiffers{5};
 
@@ -79,8 +79,8 @@ void blame(const PartitionInfo& absent, Cause& cause) {
 }  // namespace
 
 Explanation Explanations::why(const std::string& a, const std::string& b, const WhyQuery& query) {
-  const Deadline deadline =
-      discovery_.complete() ? Deadline(std::min(kPatience, timeout_)) : discovery_.call_deadline();
+  const Deadline deadline = discovery_.complete() ? Deadline(std::min(kPatienceForAnswer, timeout_))
+                                                  : discovery_.call_deadline();
   Query lookup;
   lookup.at = query.at;
   Explanation explanation;
@@ -166,7 +166,8 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     }
     parts.push_back({edge.owner, name, Request{0, edge.id, HistoryRequest{}}});
   }
-  const std::vector<Reply> replies = requests_.ask(parts, Deadline(std::min(kPatience, timeout_)));
+  const std::vector<Reply> replies =
+      requests_.ask(parts, Deadline(std::min(kPatienceForAnswer, timeout_)));
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const auto* error = std::get_if<Error>(&replies[i].body);
     if (error != nullptr && error->code == Errc::kTimeout && owners.silent.empty()) {

@@ -9,8 +9,8 @@ namespace {
 
 // Of a client that asks for frames: how old the route of a lookup that waits may be, and how long
 // other waiting lookups may be delayed by asking for it.
-constexpr Milliseconds kMaxAge{1000};
-constexpr Milliseconds kPatience{200};
+constexpr Milliseconds kMaxAgeOfRoute{1000};
+constexpr Milliseconds kPatienceForRoute{200};
 
 Error not_asked_yet(const std::string& a, const std::string& b) {
   return {Errc::kTimeout, "no time to look " + quote(b) + " up in " + quote(a)};
@@ -30,7 +30,8 @@ Lookups::Lookups(const Context& context, const WatchClient& watches, MemoryReads
 
 Result<LookupInProgress> Lookups::plan(const WantedLookup& wanted) {
   if (auto ok = requests_.check_owns_partition(); !ok) return tl::unexpected(std::move(ok.error()));
-  if (auto ok = requests_.know({wanted.a, wanted.b}, kMaxAge, Deadline(kPatience)); !ok) {
+  if (auto ok = requests_.know({wanted.a, wanted.b}, kMaxAgeOfRoute, Deadline(kPatienceForRoute));
+      !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
   const Lock lock(structure_.mutex);

@@ -11,7 +11,7 @@ namespace tfdude {
 namespace {
 
 // How long to wait for one owner before another one is asked.
-constexpr Milliseconds kPatience{250};
+constexpr Milliseconds kPatienceWithOwner{250};
 
 // Pauses while no owner can answer yet.
 constexpr Milliseconds kFirstPause{1};
@@ -124,7 +124,7 @@ Result<std::vector<KnownFrame>> OnDemand::ask_one(Owner owner, const FramesReque
     if (!part) return tl::unexpected(std::move(part.error()));
     parts.push_back(*std::move(part));
   }
-  Reply reply = std::move(links_.ask(parts, deadline.within(kPatience)).front());
+  Reply reply = std::move(links_.ask(parts, deadline.within(kPatienceWithOwner)).front());
   if (auto* error = std::get_if<Error>(&reply.body)) return tl::unexpected(std::move(*error));
   auto* answer = std::get_if<std::vector<KnownFrame>>(&reply.body);
   if (answer == nullptr) {
@@ -146,7 +146,7 @@ std::vector<KnownFrame> OnDemand::ask_others(Owner asked, const FramesRequest& r
   }
   std::vector<KnownFrame> all;
   if (parts.empty()) return all;
-  for (Reply& reply : links_.ask(parts, deadline.within(kPatience))) {
+  for (Reply& reply : links_.ask(parts, deadline.within(kPatienceWithOwner))) {
     auto* known = std::get_if<std::vector<KnownFrame>>(&reply.body);
     if (known != nullptr) merge(all, std::move(*known));
   }

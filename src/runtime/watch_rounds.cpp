@@ -11,7 +11,7 @@ namespace {
 constexpr Milliseconds kRenewEvery{1000};
 
 // Interval of retries for what has no plan, or lacks values.
-constexpr Milliseconds kRetryAfter{50};
+constexpr Milliseconds kRenewAgainAfter{50};
 
 }  // namespace
 
@@ -48,7 +48,7 @@ WatchRounds::Clock::time_point WatchRounds::on_pushed(const PushedValues& pushed
   auto due = kNever;
   for (const auto& entry : entries()) {
     if (!entry->watched->take(pushed, now) || entry->lacking.exchange(true)) continue;
-    due = begun_.load() + kRetryAfter;
+    due = begun_.load() + kRenewAgainAfter;
   }
   return due;
 }
@@ -116,7 +116,7 @@ PendingRequests* WatchRounds::step(Clock::time_point now, WatchLink& link) {
   const bool any_lacks =
       std::any_of(all.begin(), all.end(), [](const auto& entry) { return entry->lacking.load(); });
   next_ = all.empty() && open_.empty() ? kNever
-          : any_lacks                  ? std::min(renew_at_, begun_.load() + kRetryAfter)
+          : any_lacks                  ? std::min(renew_at_, begun_.load() + kRenewAgainAfter)
                                        : renew_at_;
   return nullptr;
 }

@@ -28,7 +28,7 @@ std::string to_blob(const Correlation& correlation) {
 
 namespace {
 
-constexpr std::size_t kPoseBytes = 7 * sizeof(double);
+constexpr std::size_t kBytesOfPose = 7 * sizeof(double);
 
 tl::unexpected<Error> bad_size(std::size_t size) {
   return fail(Errc::kState, "a correlation of " + std::to_string(size) + " bytes");
@@ -89,7 +89,7 @@ Result<void> read_observed(const std::string& blob, StoredCorrelation& correlati
   if (!observed) return tl::unexpected(std::move(observed.error()));
   correlation.observed = *std::move(observed);
   if (in.left() == 0) return {};
-  if (in.left() != kPoseBytes) return bad_size(blob.size());
+  if (in.left() != kBytesOfPose) return bad_size(blob.size());
   Eigen::Quaterniond rotation;
   Eigen::Vector3d translation;
   for (double& number : rotation.coeffs()) number = in.f64();

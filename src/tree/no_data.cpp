@@ -59,9 +59,9 @@ std::vector<DatedEdge> dynamic_edges(const Ends& ends, RemoteReading& others) {
 }
 
 // Writes instants, and how long ago they were if the clock can be that of their stamps.
-class Writer {
+class Wording {
  public:
-  explicit Writer(const Forest::Clock& clock) : now_(clock ? clock() : std::nullopt) {}
+  explicit Wording(const Forest::Clock& clock) : now_(clock ? clock() : std::nullopt) {}
 
   [[nodiscard]] std::string instant(std::int64_t t) const {
     return readable(time_of(t)) + (is_near(t) ? " (" + age(t) + ")" : "");
@@ -134,15 +134,15 @@ const DatedEdge& first_to_end(const std::vector<DatedEdge>& edges, const DatedEd
 
 // When all of these edges have data.
 std::string all_of(const std::vector<DatedEdge>& edges, const DatedEdge& youngest,
-                   const DatedEdge& slowest, const Writer& writer) {
+                   const DatedEdge& slowest, const Wording& wording) {
   if (edges.size() < 2) return {};
   const std::string all = std::to_string(edges.size()) + " dynamic edges here have ";
   if (youngest.oldest <= slowest.newest) {
-    return "; all " + all + "data from " + writer.span(youngest.oldest, slowest.newest);
+    return "; all " + all + "data from " + wording.span(youngest.oldest, slowest.newest);
   }
   return "; the " + all + "no instant in common: " + slowest.name() + " has samples until " +
-         writer.instant(slowest.newest) + ", " + youngest.name() + " from " +
-         writer.instant(youngest.oldest) + " on";
+         wording.instant(slowest.newest) + ", " + youngest.name() + " from " +
+         wording.instant(youngest.oldest) + " on";
 }
 
 Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query,
@@ -168,12 +168,12 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
     error.message = "an edge of the path has no data";
     return error;
   }
-  const Writer writer(clock);
+  const Wording wording(clock);
   const std::int64_t t = query.at ? nanoseconds(*query.at) : slowest->newest;
   const bool is_old = error.code == Errc::kTooOld;
   const DatedEdge& limiting = is_old ? *youngest : first_to_end(edges, *slowest, t, query);
   error.message = query.at ? "" : "there is no latest common time: ";
-  error.message += limiting.name() + " has no data for " + writer.instant(t) + ": ";
+  error.message += limiting.name() + " has no data for " + wording.instant(t) + ": ";
   if (!is_old) {
     error.message += beyond(limiting, t, query);
   } else if (limiting.oldest > t) {
@@ -187,8 +187,8 @@ Error explained_by(Error error, std::vector<DatedEdge> edges, const Query& query
   }
   const bool single = limiting.oldest == limiting.newest;
   error.message += std::string("; it has ") + (single ? "one sample, of " : "samples from ") +
-                   writer.span(limiting.oldest, limiting.newest) +
-                   all_of(edges, *youngest, *slowest, writer);
+                   wording.span(limiting.oldest, limiting.newest) +
+                   all_of(edges, *youngest, *slowest, wording);
   return error;
 }
 

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cstring>
 
+#include "transport/fastdds/rtps_layout.hpp"
+
 namespace tfdude::fastdds {
 namespace {
 
-// RTPS 2.2, sections 9.4.4, 9.4.5.2 and 9.4.5.3.
-constexpr std::size_t kPrefixAt = 8;
-constexpr std::size_t kHeader = 20;
-constexpr std::size_t kSubmessageHeader = 4;
-constexpr std::uint8_t kLittleEndian = 0x01;
-constexpr std::uint8_t kAckNack = 0x06;
-// In ACKNACK with its header: the writer, and the first sample that is missing.
+// In ACKNACK with its header (RTPS 2.2, section 9.4.5.2): the writer, and the first sample that is
+// missing.
 constexpr std::size_t kWriterAt = 8;
 constexpr std::size_t kMissingAt = 12;
 constexpr std::size_t kAckNackLeast = 20;
@@ -26,16 +23,16 @@ std::uint32_t number_at(const std::uint8_t* bytes, std::size_t size, bool little
 // Calls take(submessage) for each ACKNACK.
 template <class Take>
 void for_each_acknack(const std::uint8_t* datagram, std::size_t size, Take take) {
-  for (std::size_t at = kHeader; at + kSubmessageHeader <= size;) {
+  for (std::size_t at = rtps::kHeader; at + rtps::kSubmessageHeader <= size;) {
     const std::uint8_t* submessage = datagram + at;
-    const bool little = (submessage[1] & kLittleEndian) != 0;
+    const bool little = (submessage[1] & rtps::kLittleEndian) != 0;
     const std::size_t length = number_at(submessage + 2, 2, little);
-    if (submessage[0] == kAckNack && length + kSubmessageHeader >= kAckNackLeast &&
+    if (submessage[0] == rtps::kAckNack && length + rtps::kSubmessageHeader >= kAckNackLeast &&
         at + kAckNackLeast <= size) {
       take(submessage, little);
     }
     if (length == 0) return;  // the last one, or without content
-    at += kSubmessageHeader + length;
+    at += rtps::kSubmessageHeader + length;
   }
 }
 
@@ -43,9 +40,9 @@ void for_each_acknack(const std::uint8_t* datagram, std::size_t size, Take take)
 
 void Acknowledgements::heard(const std::uint8_t* datagram, std::size_t size) {
   if (waiting_.load(std::memory_order_relaxed) == 0) return;
-  if (size < kHeader || std::memcmp(datagram, "RTPS", 4) != 0) return;
+  if (size < rtps::kHeader || std::memcmp(datagram, "RTPS", 4) != 0) return;
   Key key;
-  std::copy_n(datagram + kPrefixAt, key.first.size(), key.first.begin());
+  std::copy_n(datagram + rtps::kPrefixAt, key.first.size(), key.first.begin());
   for_each_acknack(datagram, size, [&](const std::uint8_t* submessage, bool little) {
     std::copy_n(submessage + kWriterAt, key.second.size(), key.second.begin());
     const std::uint64_t high = number_at(submessage + kMissingAt, 4, little);

@@ -187,7 +187,7 @@ constexpr auto kFrame =
     record(TFDUDE_FIELD(id, id, Id("id")), TFDUDE_FIELD(parent, parent, Id("parent", true)),
            TFDUDE_FIELD(owner, partition, PartitionName()));
 
-constexpr auto kDescription =
+constexpr auto kDescriptionPart =
     record(TFDUDE_FIELD(size, size, Count64()), TFDUDE_FIELD(hash, hash, Count64()),
            TFDUDE_FIELD(text, text, LongText{kMaxDescriptionPart}));
 
@@ -216,7 +216,7 @@ constexpr auto kMemory = record(TFDUDE_FIELD(token_first, token, TokenPart<0>())
 
 // ---- all of them
 
-constexpr auto kBody =
+constexpr auto kReplyBody =
     cases("reply", TFDUDE_CASE(1, Error, error, kError),
           TFDUDE_CASE_IF(2, SegmentValues, transforms, kFixed, &is_fixed),
           TFDUDE_CASE(3, Done, done, DoneOctet()),
@@ -228,12 +228,12 @@ constexpr auto kBody =
           TFDUDE_CASE(9, std::vector<JointInfo>, joint_states, FirstOf(List(kJoint))),
           SignOfLife<kAlive>(), TFDUDE_CASE(11, std::vector<KnownFrame>, structure, List(kFrame)),
           TFDUDE_CASE(12, SegmentValues, incomplete, kIncomplete),
-          TFDUDE_CASE(13, DescriptionPart, description, kDescription),
+          TFDUDE_CASE(13, DescriptionPart, description, kDescriptionPart),
           TFDUDE_CASE(14, MemoryOffer, memory, kMemory));
 
 constexpr auto kReply = record(
     TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),
-    TFDUDE_FIELD(sequence_number, sequence, Count32()), TFDUDE_FIELD(body, body, kBody));
+    TFDUDE_FIELD(sequence_number, sequence, Count32()), TFDUDE_FIELD(body, body, kReplyBody));
 
 }  // namespace
 

@@ -35,7 +35,7 @@ struct FirstEdge : GivenTransform {
   }
 };
 
-constexpr auto kUpdate =
+constexpr auto kUpdateRequest =
     record(TFDUDE_FIELD(x_pc, edges, FirstEdge()), TFDUDE_FIELD(stamp, stamp, Stamp("a stamp")),
            TFDUDE_FIELD(more, edges, List(GivenEdge(), kMaxItems, 1)));
 
@@ -56,7 +56,7 @@ constexpr auto kMoveAndUpdate =
 
 bool only_moves(const MoveRequest& move) { return move.X_PC.empty(); }
 
-constexpr auto kJoints =
+constexpr auto kJointUpdate =
     Ruled(JointSamples(), at_least_one(&JointUpdate::joints, "an update without joints"));
 
 constexpr auto kCorrelate = record(TFDUDE_FIELDS(correlation, AnyCorrelation()));
@@ -233,7 +233,7 @@ constexpr auto kFrames =
                         List(record(TFDUDE_FIELD(epoch, epoch, kEpoch),
                                     TFDUDE_FIELD(partition, partition, PartitionName())))));
 
-constexpr auto kDescription = record(TFDUDE_FIELDS(from, Count64()));
+constexpr auto kDescriptionRequest = record(TFDUDE_FIELDS(from, Count64()));
 
 // The request has no fields.
 struct MemoryOctet : Octet {
@@ -245,9 +245,10 @@ constexpr auto kTime = record(TFDUDE_FIELDS(shown, Stamp("the time of a request"
 
 // ---- all of them
 
-constexpr auto kBody = cases(
+constexpr auto kRequestBody = cases(
     "request", TFDUDE_CASE(1, AddRequest, add, kAdd),
-    TFDUDE_CASE(2, RemoveRequest, remove, kRemove), TFDUDE_CASE(3, UpdateRequest, update, kUpdate),
+    TFDUDE_CASE(2, RemoveRequest, remove, kRemove),
+    TFDUDE_CASE(3, UpdateRequest, update, kUpdateRequest),
     TFDUDE_CASE_IF(4, MoveRequest, move, kMove, &only_moves),
     TFDUDE_CASE(5, MoveRequest, move_and_update, kMoveAndUpdate),
     TFDUDE_CASE_IF(6, LookupRequest, lookup, kLookup, &is_plain),
@@ -255,20 +256,20 @@ constexpr auto kBody = cases(
     TFDUDE_CASE(8, WatchRequest, watch, kWatch), TFDUDE_CASE(9, HistoryRequest, history, kOfAll),
     TFDUDE_CASE(10, ReviseRequest, revise, kRevise),
     TFDUDE_CASE(11, ConsistencyRequest, consistency, kOfAll),
-    TFDUDE_CASE(12, JointUpdate, joint_update, kJoints),
+    TFDUDE_CASE(12, JointUpdate, joint_update, kJointUpdate),
     TFDUDE_CASE(13, JointsRequest, joint_states, kJointStates),
     TFDUDE_CASE(14, CorrelateRequest, correlate, kCorrelate),
     TFDUDE_CASE(15, PartialUpdateRequest, partial_update, kPartialUpdate),
     TFDUDE_CASE(16, ForgetRequest, forget, kForget), SignOfLife<kProbe>(),
     TFDUDE_CASE(18, FramesRequest, structure, kFrames),
-    TFDUDE_CASE(19, DescriptionRequest, description, kDescription),
+    TFDUDE_CASE(19, DescriptionRequest, description, kDescriptionRequest),
     TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()),
     TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),
     TFDUDE_FIELD(sequence_number, sequence, Count32()),
-    TFDUDE_FIELD(awaits_from, awaits_from, Count64()), TFDUDE_FIELD(body, body, kBody));
+    TFDUDE_FIELD(awaits_from, awaits_from, Count64()), TFDUDE_FIELD(body, body, kRequestBody));
 
 }  // namespace
 

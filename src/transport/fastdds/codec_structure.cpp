@@ -23,7 +23,7 @@ struct Incarnation : Count64 {
   }
 };
 
-constexpr auto kEntry =
+constexpr auto kPageEntry =
     record(TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime), TFDUDE_FIELD(id, id, Id("id")),
            TFDUDE_FIELD(parent, parent, Id("parent", true)));
 
@@ -41,7 +41,7 @@ constexpr auto kPageJoint = record(TFDUDE_FIELD(name, name, Id("joint")),
 constexpr auto kPage = record(
     TFDUDE_FIELD(partition, partition, PartitionName()), TFDUDE_FIELD(number, number, Count32()),
     TFDUDE_FIELD_OF_ALL(incarnation, Incarnation()), TFDUDE_FIELD(epoch, epoch, kEpoch),
-    TFDUDE_FIELD(entries, entries, List(kEntry)),
+    TFDUDE_FIELD(entries, entries, List(kPageEntry)),
     TFDUDE_FIELD(tombstones, tombstones, List(kTombstone)),
     TFDUDE_FIELD(others, others, List(kPageEpoch)), TFDUDE_FIELD(joints, joints, List(kPageJoint)));
 

@@ -16,15 +16,15 @@
 namespace tfdude {
 namespace {
 
-struct Address {
+struct HostAndPort {
   std::string host;
   std::uint16_t port = 0;
 };
 
-std::optional<Address> parse(const std::string& text) {
+std::optional<HostAndPort> parse(const std::string& text) {
   const auto colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) return std::nullopt;
-  Address address{text.substr(0, colon), 0};
+  HostAndPort address{text.substr(0, colon), 0};
   const bool name = std::none_of(address.host.begin(), address.host.end(), [](unsigned char c) {
     return c <= ' ' || c == ':' || c == '[' || c == ']' || c == 0x7F;
   });

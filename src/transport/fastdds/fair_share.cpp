@@ -13,7 +13,7 @@ constexpr double kMemorySeconds = std::chrono::duration<double>(FairShare::kMemo
 // A sender that takes less than this part of the time is not heavy.
 constexpr double kLight = 0.05;
 
-constexpr std::chrono::milliseconds kCountEvery{1};
+constexpr std::chrono::milliseconds kRecountEvery{1};
 
 // Of the calling thread.
 struct Load {
@@ -53,7 +53,7 @@ bool FairShare::admits(Sender sender, Clock::time_point now) {
     const Lock lock(mutex_);
     const auto known = accounts_.find(sender);
     if (known == accounts_.end()) return true;
-    if (now - counted_ > kCountEvery || now < counted_) count(now);
+    if (now - counted_ > kRecountEvery || now < counted_) count(now);
     const double taken = known->second.now(now);
     const int heavy = std::max(1, heavy_ + (taken > kLight * kMemorySeconds ? 0 : 1));
     if (active_ <= 1 || taken <= kShare / heavy * kMemorySeconds) return true;

@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "transport/fastdds/rtps_layout.hpp"
+
 namespace tfdude::fastdds {
-namespace {
-
-// RTPS 2.2, section 9.4.4: "RTPS", version, vendor, and then the prefix of the sender's GUIDs.
-constexpr std::size_t kPrefixAt = 8;
-
-}  // namespace
 
 void LifeSigns::follow(const PeerId& peer) {
   const Lock lock(mutex_);
@@ -23,8 +19,8 @@ void LifeSigns::forget(const PeerId& peer) {
 
 void LifeSigns::heard(const std::uint8_t* datagram, std::size_t size, Clock::time_point now) {
   PeerId sender;
-  if (size < kPrefixAt + sender.size() || std::memcmp(datagram, "RTPS", 4) != 0) return;
-  std::copy_n(datagram + kPrefixAt, sender.size(), sender.begin());
+  if (size < rtps::kPrefixAt + sender.size() || std::memcmp(datagram, "RTPS", 4) != 0) return;
+  std::copy_n(datagram + rtps::kPrefixAt, sender.size(), sender.begin());
   const Lock lock(mutex_);
   if (const auto known = last_.find(sender); known != last_.end()) known->second = now;
 }

@@ -4,6 +4,8 @@
 #include <cstring>
 #include <endian.h>
 
+#include "transport/fastdds/rtps_layout.hpp"
+
 namespace tfdude::fastdds {
 namespace {
 
@@ -13,28 +15,8 @@ using Kind = NumberClaim::Kind;
 constexpr NumberClaim::Entity kAnnouncer{0x00, 0x01, 0x00, 0xC2};
 constexpr NumberClaim::Entity kHandshaker{0x00, 0x02, 0x01, 0xC3};
 
-// RTPS 2.2, 9.4.5.1.1, and DDS Security 1.1, 7.3.6.
-enum Id : std::uint8_t {
-  kAckNack = 0x06,
-  kHeartbeat = 0x07,
-  kGap = 0x08,
-  kInfoTimestamp = 0x09,
-  kInfoSource = 0x0C,
-  kInfoDestination = 0x0E,
-  kNackFragments = 0x12,
-  kHeartbeatFragment = 0x13,
-  kData = 0x15,
-  kDataFragment = 0x16,
-  kPad = 0x01,
-  kSecureBody = 0x30,
-  kSecurePrefix = 0x31,
-  kSecurePostfix = 0x32,
-  kMessagePrefix = 0x33,
-};
-constexpr std::uint8_t kLittleEndian = 0x01;
 constexpr std::uint8_t kInvalidate = 0x02;  // of INFO_TS
 constexpr std::uint8_t kInlineQos = 0x02;
-constexpr std::uint8_t kDataFlag = 0x04;
 constexpr std::uint8_t kKeyFlag = 0x08;
 constexpr std::uint8_t kKeyFlagOfFragments = 0x04;
 constexpr std::uint64_t kMaxNumber = (std::uint64_t{1} << 63U) - 1;
@@ -136,7 +118,7 @@ struct Submessage {
   Bytes body{nullptr, 0, true};
 
   [[nodiscard]] bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
-  [[nodiscard]] bool little() const { return has(kLittleEndian); }
+  [[nodiscard]] bool little() const { return has(rtps::kLittleEndian); }
 };
 
 class Check {
@@ -144,23 +126,23 @@ class Check {
   Check(bool secured, NumberClaims& claims) : secured_(secured), claims_(claims) {}
 
   Flaw run(const std::uint8_t* datagram, std::size_t size) {
-    constexpr std::size_t kPrefixAt = 8;
     constexpr std::uint8_t kMajorVersion = 2;
-    if (size < kHeader || std::memcmp(datagram, "RTPS", 4) != 0 || datagram[4] != kMajorVersion) {
+    if (size < rtps::kHeader || std::memcmp(datagram, "RTPS", 4) != 0 ||
+        datagram[4] != kMajorVersion) {
       return Flaw::kHeader;
     }
-    std::copy_n(datagram + kPrefixAt, sender_.size(), sender_.begin());
-    open_ = !secured_ || (size > kHeader && datagram[kHeader] == kMessagePrefix);
-    std::size_t at = kHeader;
+    std::copy_n(datagram + rtps::kPrefixAt, sender_.size(), sender_.begin());
+    open_ = !secured_ || (size > rtps::kHeader && datagram[rtps::kHeader] == rtps::kMessagePrefix);
+    std::size_t at = rtps::kHeader;
     bool shielded = false;
     while (at < size) {
       Submessage next;
       const std::size_t length = begin(datagram + at, size - at, next);
       if (length == 0) return Flaw::kLength;
-      if (next.id == kSecurePrefix) shielded = true;
+      if (next.id == rtps::kSecurePrefix) shielded = true;
       next.shielded = shielded;
       if (const Flaw flaw = check(next); flaw != Flaw::kNone) return flaw;
-      if (next.id == kSecurePostfix) shielded = false;
+      if (next.id == rtps::kSecurePostfix) shielded = false;
       at += std::min(length, size - at);
     }
     return Flaw::kNone;
@@ -168,17 +150,15 @@ class Check {
 
   // Of a datagram that is made here.
   void run_heartbeats(const std::uint8_t* datagram, std::size_t size) {
-    std::size_t length = kHeader;
+    std::size_t length = rtps::kHeader;
     for (std::size_t at = 0; length > 0 && (at += length) < size;) {
       Submessage next;
       length = begin(datagram + at, size - at, next);
-      if (length > 0 && next.id == kHeartbeat) (void)heartbeat(next);
+      if (length > 0 && next.id == rtps::kHeartbeat) (void)heartbeat(next);
     }
   }
 
  private:
-  static constexpr std::size_t kHeader = 20;
-
   // @return its length with header and padding; 0: it does not fit
   static std::size_t begin(const std::uint8_t* from, std::size_t left, Submessage& submessage) {
     constexpr std::size_t kOwnHeader = 4;
@@ -189,7 +169,7 @@ class Check {
     std::size_t length = header.u16();
     if (length > left - kOwnHeader) return 0;
     // Without a length, the last one extends to the end.
-    const bool may_be_empty = submessage.id == kPad || submessage.id == kInfoTimestamp;
+    const bool may_be_empty = submessage.id == rtps::kPad || submessage.id == rtps::kInfoTimestamp;
     if (length == 0 && !may_be_empty) length = left - kOwnHeader;
     submessage.body = Bytes(from + kOwnHeader, length, submessage.little());
     return kOwnHeader + (length + 3) / 4 * 4;
@@ -197,30 +177,30 @@ class Check {
 
   Flaw check(Submessage& next) {
     switch (next.id) {
-      case kData:
+      case rtps::kData:
         return data(next);
-      case kDataFragment:
+      case rtps::kDataFragment:
         return fragments(next);
-      case kHeartbeat:
+      case rtps::kHeartbeat:
         return heartbeat(next);
-      case kGap:
+      case rtps::kGap:
         return gap(next);
-      case kAckNack:
+      case rtps::kAckNack:
         return acknowledgement(next);
-      case kNackFragments:
+      case rtps::kNackFragments:
         return missing_fragments(next);
-      case kHeartbeatFragment:
+      case rtps::kHeartbeatFragment:
         return fragments_exist(next);
-      case kInfoSource:
+      case rtps::kInfoSource:
         return source(next);
-      case kInfoDestination:
+      case rtps::kInfoDestination:
         return at_least(next, 12);
-      case kInfoTimestamp:
+      case rtps::kInfoTimestamp:
         return at_least(next, next.has(kInvalidate) ? 0 : 8);
-      case kSecurePrefix:
-      case kMessagePrefix:
+      case rtps::kSecurePrefix:
+      case rtps::kMessagePrefix:
         return at_least(next, 20);  // kind, key, session and vector
-      case kSecureBody:
+      case rtps::kSecureBody:
         return secure_body(next);
       default:
         return Flaw::kNone;
@@ -247,7 +227,7 @@ class Check {
 
   // Whether these endpoints may talk unprotected.
   [[nodiscard]] bool may_talk(const Submessage& next, const NumberClaim::Entity& writer) const {
-    const bool is_data = next.id == kData || next.id == kDataFragment;
+    const bool is_data = next.id == rtps::kData || next.id == rtps::kDataFragment;
     return open_ || next.shielded || (is_data && (writer == kAnnouncer || writer == kHandshaker));
   }
 
@@ -288,11 +268,12 @@ class Check {
         flaw != Flaw::kNone) {
       return flaw;
     }
-    if (next.has(kDataFlag) && next.has(kKeyFlag)) return Flaw::kNumber;
-    const bool has_payload = next.has(kDataFlag) || next.has(kKeyFlag);
+    if (next.has(rtps::kDataFlag) && next.has(kKeyFlag)) return Flaw::kNumber;
+    const bool has_payload = next.has(rtps::kDataFlag) || next.has(kKeyFlag);
     if (has_payload && in.left() < 4) return Flaw::kLength;
-    if (next.has(kDataFlag) && writer == kAnnouncer && !announcement(in)) return Flaw::kLength;
-    if (next.has(kDataFlag) && writer == kHandshaker && !handshake(in)) return Flaw::kLength;
+    if (next.has(rtps::kDataFlag) && writer == kAnnouncer && !announcement(in))
+      return Flaw::kLength;
+    if (next.has(rtps::kDataFlag) && writer == kHandshaker && !handshake(in)) return Flaw::kLength;
     return admit(Kind::kData, writer, number, number);
   }
 
