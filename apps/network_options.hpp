@@ -10,9 +10,8 @@
 
 namespace tfdude::cli {
 
-/// Adds the options of discovery and the network. The environment provides those that are not given
-/// (Options).
-inline void add_network_options(CLI::App& app, Options& options) {
+/// Adds those of the options below that say which domain is joined.
+inline void add_domain_options(CLI::App& app, Options& options) {
   app.add_option("--domain", options.domain, "DDS domain, 0 to 232 (else $TFDUDE_DOMAIN, else 0)")
       ->check(CLI::Range(0, 232));
   auto* profile = app.add_option("--profile", options.profile,
@@ -21,6 +20,12 @@ inline void add_network_options(CLI::App& app, Options& options) {
          "--local", [&options] { options.profile = kLocalProfile; },
          "this computer only, as --profile local: UDP over 127.0.0.1")
       ->excludes(profile);
+}
+
+/// Adds the options of discovery and the network. The environment provides those that are not given
+/// (Options).
+inline void add_network_options(CLI::App& app, Options& options) {
+  add_domain_options(app, options);
   app.add_option("--keys", options.keys,
                  "directory of an identity, see tfdude keys (else $TFDUDE_KEYS)");
   app.add_flag_callback(

@@ -20,6 +20,10 @@ foreach(program tfduded tfdude_cli tfdude_ros tfdude_web)
     install(TARGETS ${program})
   endif()
 endforeach()
+# What tfdude becomes.
+file(RELATIVE_PATH libexec_to_lib ${CMAKE_INSTALL_FULL_LIBEXECDIR}/tfdude ${CMAKE_INSTALL_FULL_LIBDIR})
+set_target_properties(tfdude_whole PROPERTIES INSTALL_RPATH "$ORIGIN/${libexec_to_lib}")
+install(TARGETS tfdude_whole DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/tfdude)
 
 foreach(folder profiles examples)
   if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})

@@ -11,15 +11,6 @@
 
 namespace tfdude::cli {
 
-void Path::add_ends(CLI::App& app) {
-  app.add_option("A", a, "the reference frame")->required();
-  app.add_option("B", b, "the frame seen from A")->required();
-}
-
-void add_covariance_flag(CLI::App& app, bool& covariance) {
-  app.add_flag("--cov", covariance, "print the full covariance");
-}
-
 void add_watch_options(CLI::App& app, WatchOptions& options) {
   options.rate = kRedrawRate;
   add_rate(app, options.rate, "output rate, and the owners' highest rate of sending [Hz]");
@@ -28,10 +19,7 @@ void add_watch_options(CLI::App& app, WatchOptions& options) {
 }
 
 void Path::add_printing(CLI::App& app) {
-  add_covariance_flag(app, covariance);
-  app.add_flag("--matrix", matrix, "print the pose as homogeneous 4x4 matrix");
-  app.add_flag("--geodetic", geodetic,
-               "A is an earth frame: print B's latitude, longitude, altitude and place on a map");
+  PathPrinting::add_printing(app);
   explain_angles(app);
 }
 
@@ -55,10 +43,10 @@ std::vector<std::string> assumed_joints(Source source, const std::string& a, con
 }
 
 nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
-  const auto path = source.path(a, b).value_or(std::vector<PathSegment>());
-  auto object = lookup_json(a, b, X_AB, path);
-  object["unsampled_joints"] = assumed_joints(source, a, b, X_AB.basis.unspecified);
-  if (matrix) object["matrix"] = matrix_json(X_AB.pose.matrix());
+  PathFacts facts;
+  facts.path = source.path(a, b).value_or(std::vector<PathSegment>());
+  facts.assumed = assumed_joints(source, a, b, X_AB.basis.unspecified);
+  auto object = PathPrinting::json(X_AB, facts);
   if (geodetic) {
     const auto seen = geodetic_pose(X_AB);
     object["geodetic"] = seen ? geodetic_json(*seen) : nlohmann::json();
@@ -67,14 +55,15 @@ nlohmann::json Path::json(Source source, const StampedTransform& X_AB) const {
 }
 
 std::string Path::text(Source source, const Common& common, const StampedTransform& X_AB) const {
-  std::string text = describe(X_AB, {common.angles, covariance, matrix}, X_AB.basis.unspecified);
-  text += assumed_line(assumed_joints(source, a, b, X_AB.basis.unspecified));
+  PathFacts facts;
+  facts.assumed = assumed_joints(source, a, b, X_AB.basis.unspecified);
   if (geodetic) {
     const auto seen = geodetic_pose(X_AB);
-    text +=
+    facts.place =
         seen ? describe(*seen, common.angles) : "geodetic     none: " + seen.error().message + "\n";
   }
-  return text + stamp_line(source, common, a, b, X_AB.stamp);
+  facts.stamp = stamp_line(source, common, a, b, X_AB.stamp);
+  return PathPrinting::text(X_AB, facts, common.angles);
 }
 
 int Path::print(Source source, const Common& common, const StampedTransform& X_AB,

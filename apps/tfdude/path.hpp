@@ -8,15 +8,14 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "path_printing.hpp"
 
 // Paths: from frame A to frame B.
 namespace tfdude::cli {
 
 /// The ends of a path, and how transforms along it are printed.
-struct Path {
-  /// Adds A and B.
-  void add_ends(CLI::App& app);
-  /// Adds --cov, --matrix and --geodetic.
+struct Path : PathPrinting {
+  /// Also explains the unit of angles.
   void add_printing(CLI::App& app);
 
   [[nodiscard]] nlohmann::json json(Source source, const StampedTransform& X_AB) const;
@@ -26,12 +25,6 @@ struct Path {
   /// Prints one of both. @param more  for the end of the text. @return the exit status
   int print(Source source, const Common& common, const StampedTransform& X_AB,
             const std::string& more = "") const;
-
-  std::string a;
-  std::string b;
-  bool covariance = false;  ///< print the full one
-  bool matrix = false;      ///< print the pose as a matrix
-  bool geodetic = false;    ///< A is an earth frame: print the place of B
 };
 
 /// The joints that move unspecified edges of the path, and have had no sample: their positions are
@@ -40,8 +33,6 @@ struct Path {
                                                       const std::string& b,
                                                       const std::vector<std::string>& unspecified);
 
-/// Adds --cov alone.
-void add_covariance_flag(CLI::App& app, bool& covariance);
 /// Adds --rate and --composed of a path that is followed.
 void add_watch_options(CLI::App& app, WatchOptions& options);
 

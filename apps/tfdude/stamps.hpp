@@ -4,15 +4,10 @@
 #include <string>
 
 #include "command.hpp"
+#include "typed_stamp.hpp"
 
 // Stamps of the command line, and the ages of stamps.
 namespace tfdude::cli {
-
-[[nodiscard]] Time wall_clock();
-
-/// Reads a stamp of the command line: decimal seconds since the epoch, exact to nanoseconds. A
-/// negative number counts back from now. @return kInvalidInput naming the text.
-[[nodiscard]] Result<Time> parse_stamp(const std::string& text, Time now);
 
 /// As parse_stamp(), with the clock of the source, which only a relative stamp needs; no stamp for
 /// an empty text. @return also kNotYet

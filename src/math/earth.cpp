@@ -28,10 +28,6 @@ Eigen::Matrix3d axes_at(const Geodetic& place, Eigen::Vector3d& p_E) {
 
 }  // namespace
 
-std::string zone_text(const Utm& place) {
-  return (place.zone == 0 ? "" : std::to_string(place.zone)) + (place.north ? "N" : "S");
-}
-
 Result<void> check_geodetic(const Geodetic& place) {
   const auto check = [](const char* field, double value, double most, const char* range) {
     if (std::abs(value) <= most) return Result<void>();  // false for NaN

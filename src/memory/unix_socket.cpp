@@ -87,6 +87,28 @@ bool receive_wish(const Descriptor& socket, Wish& wish) {
   return size == sizeof(wish) && wish.magic == Wish().magic;
 }
 
+bool is_of_this_user(const Descriptor& socket) {
+  ucred peer{};
+  socklen_t size = sizeof(peer);
+  return getsockopt(socket.get(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+         size == sizeof(peer) && peer.uid == geteuid();
+}
+
+bool send_message(const Descriptor& socket, std::string_view message) {
+  const auto sent = send(socket.get(), message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  return sent == static_cast<ssize_t>(message.size());
+}
+
+std::string receive_message(const Descriptor& socket, std::size_t most) {
+  // Of all of it, however little is read.
+  const auto size = recv(socket.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC | MSG_DONTWAIT);
+  if (size <= 0 || static_cast<std::size_t>(size) > most) return {};
+  std::string message(static_cast<std::size_t>(size), '\0');
+  const auto received = recv(socket.get(), message.data(), message.size(), MSG_DONTWAIT);
+  if (received != size) message.clear();
+  return message;
+}
+
 bool send_welcome(const Descriptor& socket, const Welcome& welcome, int memory) {
   Welcome copy = welcome;
   iovec bytes{&copy, sizeof(copy)};

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "tfdude/base/result.hpp"
@@ -64,6 +66,13 @@ void hang_up(const Descriptor& socket);
 bool send_wish(const Descriptor& socket, const Wish& wish);
 /// Without waiting.
 [[nodiscard]] bool receive_wish(const Descriptor& socket, Wish& wish);
+
+/// Whether who was connected there, or listens there, is of this process's user.
+[[nodiscard]] bool is_of_this_user(const Descriptor& socket);
+/// Without waiting. @return false also if nobody receives, or too many messages wait
+[[nodiscard]] bool send_message(const Descriptor& socket, std::string_view message);
+/// Without waiting. @return empty: there is none, or it is longer than that
+[[nodiscard]] std::string receive_message(const Descriptor& socket, std::size_t most);
 
 /// @param memory  -1: none
 [[nodiscard]] bool send_welcome(const Descriptor& socket, const Welcome& welcome, int memory);

@@ -104,6 +104,10 @@ class Member {
   /// Null before it serves.
   [[nodiscard]] Partition* partition() { return partition_.get(); }
   [[nodiscard]] const Presence& presence() const { return presence_; }
+  /// Whether all changes of the own structure are stored, and announced or about to be.
+  [[nodiscard]] bool told() const {
+    return partition_ == nullptr || partition_->epoch() == told_epoch_;
+  }
   /// Why another process has the partition now; empty: it has not.
   [[nodiscard]] const std::string& given_up() const { return given_up_; }
   /// As Directory::partitions(), with what only this process knows of the own one.

@@ -108,6 +108,8 @@ class Partition {
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
   [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
+  /// As Pages::epoch().
+  [[nodiscard]] std::uint64_t epoch() const { return pages_.epoch(); }
   /// The number of replies kept for requests that may be repeated.
   [[nodiscard]] std::size_t kept_replies() const { return replies_.size(); }
 

@@ -26,6 +26,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       requests_(structure_, discovery_, *transport_, *this, follow()),
       memory_(context_, process_memory_,
               {[this] { watches_.look_again(); }, [this] { return look_in_memory(); }}),
+      one_shots_(context_, memory_),
       yielding_(context_),
       serving_(context_),
       queries_(context_),
@@ -81,6 +82,7 @@ Reply Participant::answer_own(const Request& request) {
 Participant::~Participant() {
   // Callbacks may use all other parts.
   lookups_.stop();
+  one_shots_.stop();
   memory_.stop();
   member_.stop_events();
   threads_.callbacks.stop();
@@ -98,7 +100,9 @@ Participant::~Participant() {
 }
 
 Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
-  return serving_.serve(frames);
+  auto served = serving_.serve(frames);
+  if (served) one_shots_.open();
+  return served;
 }
 
 Result<void> Participant::set_time(Time now, bool by_itself) {

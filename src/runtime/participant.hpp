@@ -21,6 +21,7 @@
 #include "runtime/member_runner.hpp"
 #include "runtime/memory_reads.hpp"
 #include "runtime/observations.hpp"
+#include "runtime/one_shots.hpp"
 #include "runtime/queries.hpp"
 #include "runtime/requests.hpp"
 #include "runtime/serving.hpp"
@@ -158,6 +159,7 @@ class Participant final : public TransportHandler,
   MemberRunner member_;
   Requests requests_;
   MemoryReads memory_;
+  OneShots one_shots_;
   Yielding yielding_;
   Serving serving_;
   Queries queries_;

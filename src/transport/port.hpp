@@ -170,6 +170,14 @@ class Transport {
   /// For how long a thread has been handling one message, if one is; the longest of all threads.
   [[nodiscard]] virtual std::chrono::nanoseconds busy_for() const { return {}; }
 
+  /// As network_of(): which other processes of this computer discover the same participants. Empty:
+  /// none, or only those that prove their rights by keys, or it cannot be told.
+  [[nodiscard]] virtual std::string network() const { return {}; }
+
+  /// Whether the owner of a partition was heard within the time after which it would count as lost
+  /// if this participant depended on it.
+  [[nodiscard]] virtual bool heard_lately(const std::string& /*partition*/) const { return true; }
+
   /// How long a new participant needs to discover all others, by experience.
   [[nodiscard]] virtual Milliseconds discovery_time() const = 0;
 };

@@ -16,12 +16,12 @@ namespace {
 struct Web final : Command {
   explicit Web(CLI::App& app) { app.fallthrough(false)->allow_extras()->set_help_flag(); }
 
-  // Becomes the program tfdude-web, which is beside this one, with all arguments but the one that
-  // names the command.
+  // Becomes the program tfdude-web, with all arguments but the one that names the command.
   int run(const Common& common) const override {
     std::error_code ignored;
     const auto own = std::filesystem::read_symlink("/proc/self/exe", ignored);
-    std::string program = (own.parent_path() / "tfdude-web").string();
+    const auto programs = own.parent_path() / TFDUDE_PROGRAMS;
+    std::string program = (programs / "tfdude-web").lexically_normal().string();
     std::vector<char*> arguments{program.data()};
     bool named = false;
     for (char** argument = common.argv + 1; *argument != nullptr; ++argument) {

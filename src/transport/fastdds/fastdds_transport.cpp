@@ -13,6 +13,7 @@
 #include "transport/fastdds/announcement.hpp"
 #include "transport/fastdds/discovery_server.hpp"
 #include "transport/fastdds/topics.hpp"
+#include "transport/network.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -224,6 +225,11 @@ Result<void> FastDdsTransport::serve(const std::string& partition) {
       Reader<wire::Joints>::Calls{
           [this](const wire::Joints& sample, const Info&) { take_joints(sample); }, nullptr});
   return joints_->check();
+}
+
+std::string FastDdsTransport::network() const {
+  const bool plain = options_.keys.empty() && options_.discovery_server.empty();
+  return plain ? network_of(options_.domain, options_.profile) : std::string();
 }
 
 // A discovery server forwards several times per second, one step of the discovery at a time.

@@ -86,6 +86,10 @@ class FastDdsTransport final : public Transport {
   std::uint64_t refused_datagrams() const override { return guard_->refused(); }
   std::chrono::nanoseconds busy_for() const override { return gate_->busy_for(Gate::Clock::now()); }
   std::vector<IncompatiblePeer> incompatible() const override { return peers_.incompatible(); }
+  std::string network() const override;
+  bool heard_lately(const std::string& partition) const override {
+    return peers_.heard_lately(partition);
+  }
   Milliseconds discovery_time() const override;
 
   // Of ParticipantListener, from a thread of the library.

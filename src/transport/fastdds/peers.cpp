@@ -167,6 +167,17 @@ bool Peers::silent(const std::string& partition) const {
   return silent;
 }
 
+bool Peers::heard_lately(const std::string& partition) const {
+  const Lock lock(mutex_);
+  const auto earliest = Clock::now() - patience_.needed;
+  for (const auto& [id, server] : servers_) {
+    if (!server.presence || server.presence->partition != partition) continue;
+    const auto sign = life_signs_->last(id).value_or(server.heard.last);
+    if (std::max(sign, server.heard.last) > earliest) return true;
+  }
+  return false;
+}
+
 bool Peers::replaced(const PeerId& peer) const {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer);

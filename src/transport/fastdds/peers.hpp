@@ -101,6 +101,9 @@ class Peers {
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
 
+  /// As Transport::heard_lately().
+  [[nodiscard]] bool heard_lately(const std::string& partition) const;
+
   /// Whether a server is silent, and a later process serves its partition, or has.
   [[nodiscard]] bool replaced(const PeerId& peer) const;
 
