@@ -47,6 +47,7 @@ function(tfdude_generate_idl target idl)
     COMMENT "fastddsgen ${idl}"
     VERBATIM)
   add_library(${target} OBJECT ${sources} ${headers})
+  tfdude_compile_together(${target})
   target_include_directories(${target} SYSTEM PUBLIC ${dir})
   target_link_libraries(${target} PUBLIC tfdude_fastdds)
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
