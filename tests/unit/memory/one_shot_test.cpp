@@ -1,10 +1,8 @@
 #include "memory/one_shot.hpp"
 
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstring>
-#include <limits>
+#include <optional>
 #include <string>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -54,6 +52,11 @@ std::unique_ptr<OneShotSocket> serve() {
     const auto question = one_shot_question(message);
     return question ? reply_to(*question) : std::string();
   });
+}
+
+// A busy machine may need longer than is waited for.
+bool answers() {
+  return testing::eventually([] { return ask_once(network(), {"a", "b"}).has_value(); });
 }
 
 Clock::duration time_of_asking(bool& answered) {
@@ -129,14 +132,17 @@ TEST_CASE("who asks a process of this user is answered, and nobody if it has end
   CHECK_FALSE(answered);
   auto first = serve();
   REQUIRE(first);
-  const auto found = ask_once(network(), {"world", "hand"});
-  REQUIRE(found);
+  std::optional<OneShotAnswer> found;
+  REQUIRE(testing::eventually([&] {
+    found = ask_once(network(), {"world", "hand"});
+    return found.has_value();
+  }));
   CHECK(found->X_AB.basis.unspecified == std::vector<std::string>{"world", "hand"});
   CHECK_FALSE(ask_once(network() + "other", {"world", "hand"}));
   const auto second = serve();
   REQUIRE(second);
   first.reset();
-  CHECK(ask_once(network(), {"world", "hand"}));
+  CHECK(answers());
 }
 
 TEST_CASE("if one process does not know the answer, another one is asked") {
@@ -150,7 +156,7 @@ TEST_CASE("if one process does not know the answer, another one is asked") {
   CHECK_FALSE(ask_once(network(), {"a", "b"}));
   const auto knows = serve();
   REQUIRE(knows);
-  CHECK(ask_once(network(), {"a", "b"}));
+  CHECK(answers());
 }
 
 TEST_CASE("as many processes of a network as can be asked open sockets, and no more") {
@@ -164,7 +170,7 @@ TEST_CASE("as many processes of a network as can be asked open sockets, and no m
 TEST_CASE("a process that does not answer is waited for no longer than some milliseconds") {
   const auto listening = listen_at(one_shot_name(network(), 0));
   REQUIRE(listening);
-  const auto answers = serve();
+  const auto would_answer = serve();
   bool answered = true;
   CHECK(time_of_asking(answered) >= std::chrono::milliseconds(9));
   CHECK_FALSE(answered);
@@ -182,13 +188,13 @@ TEST_CASE("who connects and is silent, or says nonsense, keeps nobody from being
   const auto nonsense = connect_to(one_shot_name(network(), 0));
   REQUIRE(nonsense);
   CHECK(send_message(*nonsense, std::string(1000, 'x')));
-  CHECK(ask_once(network(), {"a", "b"}));
+  CHECK(answers());
   // More than are listened to: they are let go.
   for (int i = 0; i < 100; ++i) {
     auto one = connect_to(one_shot_name(network(), 0));
     if (one) silent.push_back(*std::move(one));
   }
-  CHECK(testing::eventually([] { return ask_once(network(), {"a", "b"}).has_value(); }));
+  CHECK(answers());
 }
 
 TEST_CASE("another user is not answered, nor asked") {
