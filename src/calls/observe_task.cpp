@@ -68,6 +68,9 @@ Result<void> ObserveTask::plan(const Directory& directory, Clock::time_point) {
   auto planned = route_observe(forest_, directory, a, b, beside, stamp);
   if (!planned) return tl::unexpected(std::move(planned.error()));
   plan_ = *std::move(planned);
+  for (std::size_t i = 0; i < plan_.path_parts; ++i) {
+    std::get<LookupRequest>(plan_.parts[i].request.body).rows = Rows::kOfPath;
+  }
   return {};
 }
 
@@ -174,6 +177,7 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
   untie_outdated(plan_, path, *edges);
+  loosen(plan_, *edges);
   const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
       *edges, measurement_.X_AB, source, measurement_.options);
   if (found) return apply(path, *found);

@@ -73,6 +73,7 @@ struct LookupRequest {
   /// Another instant at which the answer may be useful; see LatestHints.
   std::optional<Time> hint{};
   bool edges = false;  ///< each segment is an edge to be observed: its full correlation is needed
+  Rows rows = Rows::kNone;  ///< of such edges
   /// A velocity is computed from the answer, so stamps that the owner has made up do not count.
   bool timed = false;
 };

@@ -1,6 +1,7 @@
 #include "partition/observing.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string_view>
 #include <utility>
@@ -42,6 +43,7 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
     LookupRequest request;
     if (!beside) request.query.at = stamp;
     request.edges = true;
+    if (beside) request.rows = Rows::kAll;
     auto fresh = route_to(directory, edge.info.owner, Request{0, edge.info.id, std::move(request)});
     if (!fresh) return tl::unexpected(std::move(fresh.error()));
     plan.parts.push_back(*std::move(fresh));
@@ -137,6 +139,36 @@ void untie(Belief& X) {
   X.common_errors = std::move(named);
 }
 
+// An edge beside the path is corrected at the instants at which it was observed, not at its newest.
+void add_rows(const std::vector<RowOfSample>& rows, const Edge& edge, std::size_t k,
+              ObservedPath& path) {
+  bool first = edge.way == Way::kBeside;
+  for (const RowOfSample& row : rows) {
+    if (row.segment != edge.index) continue;
+    const Belief X_PC = belief_of(row.X_PC, row.correlation);
+    if (first) {
+      path.edges[k].X_PC = X_PC;
+      path.rows[k].stamp = row.stamp;
+    } else {
+      path.edges.push_back({X_PC, Way::kBeside});
+      path.correlations.push_back(row.correlation);
+      path.rows.push_back({k, row.stamp});
+    }
+    first = false;
+  }
+}
+
+// Whether the edge was observed on the path before all instants that are kept of it.
+bool precedes_rows(const ObservedEdge& edge) {
+  return edge.way != Way::kBeside && edge.X_PC.unknown && was_observed(edge.X_PC);
+}
+
+void widen(Belief& X, double by) {
+  X.own = Covariance::trusted(Matrix6d(by * X.own.matrix()));
+  if (X.unknown) X.unknown = Covariance::trusted(Matrix6d(by * X.unknown->matrix()));
+  for (CommonError& one : X.common_errors) one.loading *= std::sqrt(by);
+}
+
 // The request of the edge's owner, in which all its edges are revised at once; another one if it
 // has dynamic edges at another instant.
 ReviseRequest& revision_of(const ObservePlan& plan, const ObservedPath& path, std::size_t edge,
@@ -163,6 +195,13 @@ const Edge& edge_of(const ObservePlan& plan, const std::string& id) {
                        [&](const Edge& edge) { return edge.info.id == id; });
 }
 
+// An owner stores one part beside the common errors. One that is known to be independent may have
+// become part of what is not.
+Covariance stored_part(const Belief& X) {
+  if (!X.unknown) return X.own;
+  return X.own.matrix().isZero(0) ? *X.unknown : bound(*X.unknown, X.own);
+}
+
 // Whether an owner has what a revision has made of an edge, up to the rounding of a lookup. Sources
 // have names that no other observation uses.
 bool is_same(const Belief& X, const Revision& revision) {
@@ -173,11 +212,42 @@ bool is_same(const Belief& X, const Revision& revision) {
   const auto& ours = revision.correlation.common_errors;
   const auto& theirs = X.common_errors;
   const Pose difference = X.pose.inverse() * revision.X_PC.pose;
-  const Matrix6d own = (X.unknown ? *X.unknown : X.own).matrix();
+  const Matrix6d own = stored_part(X).matrix();
   const Matrix6d revised = revision.X_PC.covariance.of_specified().matrix();
   return std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end(), same_source) &&
          log(difference).norm() <= kRounding * (1 + X.pose.translation().norm()) &&
          (own - revised).norm() <= kRounding * revised.norm();
+}
+
+// What an owner has now of the edge of a revision, that it was asked for as segment i.
+std::optional<Belief> present_belief(const SegmentValues& present, std::size_t i,
+                                     const Revision& revision) {
+  if (!revision.stamp) return belief_of(present.values[i], present.correlations[i]);
+  for (const RowOfSample& row : present.rows) {
+    if (row.segment == i && row.stamp == revision.stamp)
+      return belief_of(row.X_PC, row.correlation);
+  }
+  return std::nullopt;
+}
+
+// The row of the path that a revision has corrected.
+std::size_t row_of(const ObservePlan& plan, const ObservedPath& path, const Revision& revision) {
+  const auto found =
+      std::find_if(path.rows.begin(), path.rows.end(), [&](const ObservedPath::Row& row) {
+        return plan.edges[row.edge].info.id == revision.id && row.stamp == revision.stamp;
+      });
+  return static_cast<std::size_t>(found - path.rows.begin());
+}
+
+// What a row of the path was before.
+Revision as_it_was(const ObservedPath& path, const std::string& id, std::size_t k) {
+  const Belief& X = path.edges[k].X_PC;
+  Revision revision{id,
+                    {X.pose, stored_part(X)},
+                    {X.unknown.has_value(), X.common_errors, path.correlations[k].observed_with},
+                    path.rows[k].stamp};
+  revision.X_PC.covariance.set_complete(!X.unspecified);
+  return revision;
 }
 
 // The correlation that an owner stores for an observed edge. It never lists the edge itself twice,
@@ -261,8 +331,27 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
       if (!known) path.missing.push_back(id);
     }
   }
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) path.rows.push_back({k, {}});
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    add_rows(answers[plan.edges[k].part].rows, plan.edges[k], k, path);
+  }
   for (std::size_t k = 0; k < plan.edges.size(); ++k) add_lacking(plan, path, k, path.lacking);
   return path;
+}
+
+void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges) {
+  constexpr double kMore = 0.01;
+  const auto is_unspecified = [](const ObservedEdge& edge) {
+    return edge.way != Way::kBeside && edge.X_PC.unspecified;
+  };
+  if (std::none_of(edges.begin(), edges.end(), is_unspecified)) return;
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    if (!precedes_rows(edges[k])) continue;
+    for (ObservedEdge& edge : edges) widen(edge.X_PC, 1 + kMore);
+    Belief& X = edges[k].X_PC;
+    X.own = Covariance::trusted(Matrix6d((1 + 1 / kMore) * X.unknown->matrix()));
+    X.unknown.reset();
+  }
 }
 
 void untie_outdated(const ObservePlan& plan, const ObservedPath& path,
@@ -272,7 +361,7 @@ void untie_outdated(const ObservePlan& plan, const ObservedPath& path,
     return on_path(edge) && is_uncertain(edge.X_PC);
   });
   bool alone = false;
-  for (std::size_t k = 0; k < edges.size(); ++k) {
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     Belief& X = edges[k].X_PC;
     if (X.unspecified || !is_outdated(plan, path, k)) continue;
     if (!on_path(edges[k])) {
@@ -292,10 +381,13 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
                             const Observation& observation,
                             const std::vector<std::string>& absent) {
   std::vector<std::string> together;
-  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+  for (std::size_t k = 0; k < observation.edges.size(); ++k) {
     const auto& [X_PC, corrected, forgotten, innovation] = observation.edges[k];
-    if (corrected && !forgotten) together.push_back(plan.edges[k].info.id);
+    const std::string& id = plan.edges[path.rows[k].edge].info.id;
+    const bool listed = path.rows[k].edge != k && std::count(together.begin(), together.end(), id);
+    if (corrected && !forgotten && !listed) together.push_back(id);
   }
+  const bool none = observation.accepted && together.empty();
   const auto keep = [&](const std::string& id) {
     if (together.size() < kMaxCorrelated) together.push_back(id);
   };
@@ -306,18 +398,23 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
     for (int i = listed ? 1 : 0; i < 2; ++i) keep(id);
   }
   std::vector<Part> parts;
-  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+  for (std::size_t k = 0; k < observation.edges.size(); ++k) {
     const ObservedResult& result = observation.edges[k];
-    if (!result.corrected && !(result.innovation.expected > 0)) continue;
-    const Edge& observed = plan.edges[k];
+    const ObservedPath::Row& row = path.rows[k];
+    // Nothing was gained, but its owner learns that it is observed at earlier instants.
+    const bool keeps = none && precedes_rows(path.edges[row.edge]);
+    if (!result.corrected && !keeps && !(result.innovation.expected > 0)) continue;
+    const Edge& observed = plan.edges[row.edge];
     ReviseRequest::Edge edge{observed.info.id, result.innovation, !observation.accepted, {}};
-    if (result.corrected) {
+    if (keeps && !result.corrected) {
+      edge.revision = as_it_was(path, edge.id, k);
+    } else if (result.corrected) {
       const Belief& X = result.X_PC;
       edge.revision = Revision{
-          edge.id, {X.pose, X.unknown ? *X.unknown : X.own}, correlation_of(edge.id, X, together)};
+          edge.id, {X.pose, stored_part(X)}, correlation_of(edge.id, X, together), row.stamp};
       edge.revision->X_PC.covariance.set_complete(!X.unspecified);
     }
-    revision_of(plan, path, k, parts).edges.push_back(std::move(edge));
+    revision_of(plan, path, row.edge, parts).edges.push_back(std::move(edge));
   }
   return parts;
 }
@@ -327,6 +424,7 @@ Part present_values(const ObservePlan& plan, const Part& revised) {
   LookupRequest request;
   request.query.at = revise.stamp;
   request.edges = true;
+  request.rows = Rows::kAll;
   Part part = revised;
   for (const ReviseRequest::Edge& edge : revise.edges) {
     if (edge.revision) request.segments.push_back({edge_of(plan, edge.id).info.parent, edge.id});
@@ -350,15 +448,9 @@ std::optional<Part> taken_back(const ObservePlan& plan, const ObservedPath& path
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
     Revision& revision = *edges[i].revision;
-    if (!is_same(belief_of(present.values[i], present.correlations[i]), revision)) {
-      return std::nullopt;
-    }
-    const auto k = static_cast<std::size_t>(&edge_of(plan, revision.id) - plan.edges.data());
-    const Belief& X = path.edges[k].X_PC;
-    revision.X_PC = {X.pose, X.unknown ? *X.unknown : X.own};
-    revision.X_PC.covariance.set_complete(!X.unspecified);
-    revision.correlation = {X.unknown.has_value(), X.common_errors,
-                            path.correlations[k].observed_with};
+    const auto now = present_belief(present, i, revision);
+    if (!now || !is_same(*now, revision)) return std::nullopt;
+    revision = as_it_was(path, revision.id, row_of(plan, path, revision));
     edges[i].innovation = {};
   }
   return part;

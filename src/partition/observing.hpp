@@ -32,8 +32,14 @@ struct ObservePlan {
 /// The plan with the values of all edges: those of the path at one instant, those beside it at
 /// their newest.
 struct ObservedPath {
-  std::vector<ObservedEdge> edges;
+  std::vector<ObservedEdge> edges;            ///< those of the plan, then further rows of these
   std::vector<PathCorrelation> correlations;  ///< as their owners store them
+  /// An edge that drifts is corrected at several instants (RowOfSample).
+  struct Row {
+    std::size_t edge = 0;         ///< of the plan
+    std::optional<Time> stamp{};  ///< absent: that of the edge
+  };
+  std::vector<Row> rows;  ///< by edge, as `edges`
   struct Seen {
     std::uint64_t commit = 0;
     std::uint64_t incarnation = 0;
@@ -60,6 +66,12 @@ struct ObservedPath {
 /// @return kNotOwner if an answer does not match the request.
 [[nodiscard]] Result<ObservedPath> observed_path(const ObservePlan& plan,
                                                  const std::vector<SegmentValues>& answers);
+
+/// If nothing is known of an edge of the path, and another one that drifts was observed later: what
+/// it may have drifted until then counts as independent, many times, and the errors of all edges
+/// count a little more. That is enough for any correlation, and ties the edge to the others.
+/// @param edges  those of the path
+void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges);
 
 /// Makes what is not known any more of how the edges are correlated unknown. If a sample of a
 /// dynamic edge was observed, and what it was observed with was observed again without it, its

@@ -140,7 +140,8 @@ Reply Partition::answer_new(const PeerId& peer, const Request& request, Time now
 Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const {
   Reply reply;
   reply.sequence = sequence;
-  auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges);
+  auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges,
+                                        lookup.rows);
   if (values && lookup.timed && lookup.query.at) {
     auto timed = forest_.check_timed(lookup.segments, *lookup.query.at);
     if (!timed) values = tl::unexpected(std::move(timed.error()));

@@ -305,10 +305,12 @@ class Forest {
   /// @param hint  another instant that may be useful; the one that was asked for says that it is
   ///   the latest common time, which others have found
   /// @param edges  the segments are single edges, whose full correlation is needed
+  /// @param rows  of such edges
   [[nodiscard]] Result<SegmentValues> lookup_segments(const std::vector<PathEnds>& segments,
                                                       const Query& query = {},
                                                       std::optional<Time> hint = std::nullopt,
-                                                      bool edges = false) const;
+                                                      bool edges = false,
+                                                      Rows rows = Rows::kNone) const;
 
   /// Whether the motion of such segments around an instant is known by stamps that came with the
   /// samples.

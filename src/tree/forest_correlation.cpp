@@ -7,9 +7,34 @@
 #include "base/saturating.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/sample_rows.hpp"
 
 // How the errors of edges are correlated.
 namespace tfdude {
+namespace {
+
+// All revisions of the edge of the first one, by their stamps. One of an instant that comes twice
+// is taken once.
+std::vector<const Revision*> samples_of(const std::vector<Revision>& edges, std::size_t first,
+                                        std::int64_t stamp) {
+  const auto stamp_of = [&](const Revision* one) {
+    return one->stamp ? nanoseconds(*one->stamp) : stamp;
+  };
+  std::vector<const Revision*> all;
+  for (std::size_t i = first; i < edges.size(); ++i) {
+    if (edges[i].id == edges[first].id) all.push_back(&edges[i]);
+  }
+  std::stable_sort(all.begin(), all.end(), [&](const Revision* one, const Revision* other) {
+    return stamp_of(one) < stamp_of(other);
+  });
+  const auto same = [&](const Revision* one, const Revision* other) {
+    return stamp_of(one) == stamp_of(other);
+  };
+  all.erase(std::unique(all.begin(), all.end(), same), all.end());
+  return all;
+}
+
+}  // namespace
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
   return {X.pose, X.covariance.of_specified(), correlation.unknown, correlation.common_errors,
@@ -153,26 +178,19 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
     if (edge.samples->sample(number)->commit <= seen) continue;
     return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
   }
-  // A value of the past is computed from the last one that was observed.
-  const Sample* later = drifts(edge) ? observed_after(edge, at) : nullptr;
-  if (later != nullptr && later->commit > seen) {
-    return fail(Errc::kChangedMeanwhile, who + " was observed at a later instant meanwhile");
+  // Values at all instants are computed from the last one that was observed.
+  const Sample* last = drifts(edge) ? last_observed(edge) : nullptr;
+  if (last != nullptr && last->commit > seen) {
+    return fail(Errc::kChangedMeanwhile, who + " was observed at another instant meanwhile");
   }
-  return there ? Result<void>() : check_sample(edge, at);
-}
-
-const Sample* observed_after(const HeldVersion& edge, std::int64_t t) {
-  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
-    const Sample* sample = edge.samples->sample(number);
-    if (sample == nullptr || sample->stamp <= t) break;
-    if (sample->revision() != nullptr && sample->revision()->observed) return sample;
-  }
-  return nullptr;
+  if (there) return {};
+  if (!revision.stamp) return check_sample(edge, at);
+  return fail(Errc::kChangedMeanwhile, who + " has lost a sample since it was observed");
 }
 
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
-                                 std::int64_t stamp) {
-  SampleRevision fresh{revision.X_PC, revision.correlation, true, false};
+                                 std::int64_t stamp, const RowInfo& row) {
+  SampleRevision fresh{revision.X_PC, revision.correlation, row};
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
     const std::uint64_t place = samples.place_of(stamp);
@@ -180,12 +198,12 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
     if (after != nullptr && after->stamp == stamp) {
       fresh.given = given(*after);
-      fresh.between = is_between(*after);
+      fresh.row.between = is_between(*after);
     } else if (after != nullptr && before != nullptr) {
       const double s = static_cast<double>(stamp - before->stamp) /
                        static_cast<double>(after->stamp - before->stamp);
       interpolate(given(*before), given(*after), s, fresh.given);
-      fresh.between = true;
+      fresh.row.between = true;
     }
   }
   const std::uint32_t slot = newest.slot;
@@ -195,16 +213,47 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
   while (carries_on && ++number < frames_.newest_value(slot).samples->next()) {
     const SampleHistory& samples = *frames_.newest_value(slot).samples;
     const Sample& later = *samples.sample(number);
+    if (later.revision() != nullptr && later.revision()->row.observed) break;
     const Sample& before = *samples.sample(number - 1);
     const std::int64_t at = later.stamp;
     const CorrelatedValue value =
         drifted(before, nullptr, given(later).pose, samples.timing().process_noise,
                 static_cast<double>(at - before.stamp) * 1e-9);
     const SampleRevision moved{
-        {given(later).pose, {}}, value.correlation, false, is_between(later)};
+        {given(later).pose, {}}, value.correlation, {false, is_between(later), 0, stamp}};
     replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
   }
   if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
+}
+
+// Rows that the revisions leave out are over: what ties the others to them is lost.
+void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
+                                  std::int64_t stamp) {
+  const auto stamp_of = [&](const Revision& one) {
+    return one.stamp ? nanoseconds(*one.stamp) : stamp;
+  };
+  const HeldVersion& edge = frames_.newest_value(slot);
+  const Sample* last = drifts(edge) && edge.samples->count() > 0 ? last_observed(edge) : nullptr;
+  const std::int64_t until = last != nullptr ? last->stamp : kAlways;
+  std::uint8_t lasts = last != nullptr ? last->revision()->row.lasts : std::uint8_t{0};
+  const bool on_path = std::any_of(revisions.begin(), revisions.end(),
+                                   [](const Revision* one) { return !one->stamp; });
+  if (stamp_of(*revisions.back()) > until) {
+    if (lasts > 0) --lasts;
+  } else if (on_path && stamp < until) {
+    lasts = std::max(lasts, lasting(1 + observed_since(edge, stamp)));
+  }
+  const auto is_tied = [](const Revision& one) {
+    const auto& errors = one.correlation.common_errors;
+    return !one.correlation.unknown && std::any_of(errors.begin(), errors.end(), is_observed);
+  };
+  // The latest first: the samples after each row are carried on up to the next one.
+  for (std::size_t i = revisions.size(); i-- > 0;) {
+    const std::int64_t at = stamp_of(*revisions[i]);
+    const bool follows = i > 0 && is_tied(*revisions[i - 1]);
+    const std::int64_t before = follows ? stamp_of(*revisions[i - 1]) : kAlways;
+    revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before});
+  }
 }
 
 void Forest::Impl::show_revision(std::uint32_t slot) {
@@ -244,7 +293,9 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
   const Pose& G_PC = value.X_PC.pose;
   const CorrelatedValue next =
       drifted(other, said, G_PC, newest.samples->timing().process_noise, seconds);
-  const SampleRevision revision{{G_PC, {}}, next.correlation};
+  RowInfo row;
+  if (follows && other.revision() != nullptr) row.follows = other.revision()->row.follows;
+  const SampleRevision revision{{G_PC, {}}, next.correlation, row};
   const std::uint32_t slot = newest.slot;
   push_checked(newest, {next.X_PC, nullptr, &revision}, stamp);
   show_revision(slot);
@@ -255,7 +306,9 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
 void Forest::Impl::give_between(const HeldVersion& newest, const Sample& there, const Pose& G_PC) {
   const Transform X = there.value();
   const SharedRevision& before = *there.revision();
-  const SampleRevision revision{{G_PC, {}}, before.correlation(), before.observed, false};
+  RowInfo row = before.row;
+  row.between = false;
+  const SampleRevision revision{{G_PC, {}}, before.correlation(), row};
   const std::uint32_t slot = newest.slot;
   replace_sample(newest, {X, nullptr, &revision}, there.stamp);
   show_revision(slot);
@@ -289,7 +342,8 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   for (const Revision& edge : edges) {
     const auto slot = impl_->frames_.held_slot(edge.id);
     if (!slot) return tl::unexpected(slot.error());
-    auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge, stamp, seen);
+    auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge,
+                                    edge.stamp ? edge.stamp : stamp, seen);
     if (!ok) return ok;
     slots.push_back(*slot);
   }
@@ -301,9 +355,13 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
     if (revised && !Impl::drifts(newest)) impl_->unlink(newest);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (std::count(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(i), slots[i]) > 0) {
+      continue;
+    }
     const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
-    if (newest.moving() && stamp) {
-      impl_->revise_sample(newest, edges[i], nanoseconds(*stamp));
+    if (newest.moving() && (stamp || edges[i].stamp)) {
+      const std::int64_t at = stamp ? nanoseconds(*stamp) : kAlways;
+      impl_->revise_samples(slots[i], samples_of(edges, i, at), at);
       continue;
     }
     const Correlation said =

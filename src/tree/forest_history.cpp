@@ -131,7 +131,10 @@ void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
   if (left.cleared || !left.stamp) return;
   const bool revised = given && fresh.correlation != nullptr && fresh.correlation->revised();
   SampleRevision revision;
-  if (revised) revision = {{*given, {}}, fresh.correlation->now()};
+  if (revised) {
+    const RowInfo row{true, false, 0, nanoseconds(*left.stamp)};
+    revision = {{*given, {}}, fresh.correlation->now(), row};
+  }
   append_to(fresh, {fresh.X_PC, nullptr, revised ? &revision : nullptr}, nanoseconds(*left.stamp));
   fresh.samples->left_behind = true;
 }

@@ -14,9 +14,6 @@
 
 namespace tfdude {
 
-/// The last sample after the instant at which the edge itself was observed; null: none.
-[[nodiscard]] const Sample* observed_after(const HeldVersion& edge, std::int64_t t);
-
 /// The writer's side of Forest. It works under mutex_: it pushes versions on slots, and then
 /// commits them. It is one class, since one commit may concern structure, samples and correlations
 /// at once, and all three are pushed as one version of an edge. Separate parts are: what readers
@@ -191,9 +188,14 @@ class Forest::Impl {
   void unlink(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   /// Makes the row of a dynamic edge's newest sample that of the edge.
   void show_revision(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
-  /// Corrects a dynamic edge at an instant. If it drifts, all later samples have the same error.
-  void revise_sample(const HeldVersion& newest, const Revision& revision, std::int64_t stamp)
-      TFDUDE_REQUIRES(mutex_);
+  /// Corrects a dynamic edge at an instant. If it drifts, later samples have the same error, up to
+  /// the next one that was observed itself.
+  void revise_sample(const HeldVersion& newest, const Revision& revision, std::int64_t stamp,
+                     const RowInfo& row) TFDUDE_REQUIRES(mutex_);
+  /// Corrects a dynamic edge at the instants of the revisions, sorted by their stamps.
+  /// @param stamp  of those that have none
+  void revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
+                      std::int64_t stamp) TFDUDE_REQUIRES(mutex_);
   /// Pushes the newest value again, with another correlation.
   void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,

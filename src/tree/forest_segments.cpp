@@ -13,6 +13,7 @@
 #include "tree/path_walk.hpp"
 #include "tree/read_intact.hpp"
 #include "tree/remote_edges.hpp"
+#include "tree/sample_rows.hpp"
 #include "tree/unspecified_edges.hpp"
 
 // Lookups of segments that another participant asks for.
@@ -251,48 +252,10 @@ std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t 
   return all;
 }
 
-// Going back, the drift of an interval counts so many times: it is a part of the later error, of
-// which it is taken as independent. Counted once, variances came out up to 17 % too small.
-constexpr double kUntied = 3;
-
-// The value of an edge that drifts, at an instant before the last one at which it was observed: as
-// it follows from there, backwards, with what may have been added on the way. Its sample of that
-// instant is not tied any more to what was observed since.
-std::optional<CorrelatedValue> as_observed_later(const HeldVersion& edge, std::int64_t t) {
-  if (!edge.samples->timing().drifts) return std::nullopt;
-  const Sample* later = observed_after(edge, t);
-  std::uint64_t back = 0;
-  const auto around = edge.samples->around(t, edge.number, back);
-  if (later == nullptr || around.before == nullptr) return std::nullopt;
-  Pose G_PC = given(*around.before).pose;
-  if (around.before->stamp != t) {
-    if (around.after == nullptr) return std::nullopt;
-    const double s = static_cast<double>(t - around.before->stamp) /
-                     static_cast<double>(around.after->stamp - around.before->stamp);
-    interpolate(given(*around.before).pose, given(*around.after).pose, s, G_PC);
-  }
-  const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
-  return drifted(*later, said, G_PC, edge.samples->timing().process_noise,
-                 kUntied * static_cast<double>(later->stamp - t) * 1e-9);
-}
-
-void set_value(SegmentValues& found, std::size_t i, const CorrelatedValue& value) {
-  found.values[i] = value.X_PC;
-  PathCorrelation& correlation = found.correlations[i];
-  correlation.common_errors = value.correlation.common_errors;
-  correlation.unknown.reset();
-  if (!value.correlation.unknown) return;
-  StatedCovariance& own = found.values[i].covariance;
-  const bool complete = own.complete();
-  correlation.unknown = own.of_specified();
-  own = Covariance();
-  own.set_complete(complete);
-}
-
 // Adds the edges that each single edge was observed with. A dynamic edge is listed with itself
 // twice: what was observed is its sample, and a later one has another error. One that drifts is
 // listed three times: its later error follows from the earlier one.
-void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
+void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
     return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
@@ -306,10 +269,10 @@ void tell_observed_with(const std::vector<Ends>& edges, SegmentValues& found) {
       with.assign(edge->samples->timing().drifts ? 3 : 2, std::string(edge->name->text));
       if (!found.stamp) continue;
       const std::int64_t t = nanoseconds(*found.stamp);
-      const auto value = as_observed_later(*edge, t);
-      if (value) set_value(found, i, *value);
-      const auto others = value ? value->correlation.observed_with : observed_with_at(*edge, t);
-      std::copy_if(others.begin(), others.end(), std::back_inserter(with),
+      const auto last = tell_rows(*edge, i, t, rows, found);
+      const auto others = last ? *last : observed_with_at(*edge, t);
+      auto& all = found.correlations[i].observed_with;
+      std::copy_if(others.begin(), others.end(), std::back_inserter(all),
                    [&](const std::string& id) { return id != edge->name->text; });
     } else if (edge->correlation != nullptr) {
       found.correlations[i].observed_with = edge->correlation->now().observed_with;
@@ -398,7 +361,7 @@ bool all_finite(const ValuesAtInstant& found) {
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
-                                              bool edges) const {
+                                              bool edges, Rows rows) const {
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
@@ -407,7 +370,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     return tl::unexpected(explained(std::move(found.error()), *ends, query, impl_->now_));
   }
   describe(*ends, *found);
-  if (edges) tell_observed_with(*ends, *found);
+  if (edges) tell_observed_with(*ends, rows, *found);
   return found;
 }
 

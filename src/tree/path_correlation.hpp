@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/base/time.hpp"
 #include "tfdude/math/belief.hpp"
 #include "tfdude/types/correlation.hpp"
 
@@ -60,6 +61,9 @@ struct Revision {
   std::string id;
   Transform X_PC;
   Correlation correlation;
+  /// Of the sample, if it is not the one that was observed: an edge that drifts is corrected at
+  /// several instants.
+  std::optional<Time> stamp{};
 };
 
 }  // namespace tfdude

@@ -50,7 +50,7 @@ struct CorrelatedValue {
 /// Whether it is of an observation between two samples, and none was given for its stamp.
 [[nodiscard]] inline bool is_between(const Sample& sample) {
   const SharedRevision* revision = sample.revision();
-  return revision != nullptr && revision->between;
+  return revision != nullptr && revision->row.between;
 }
 
 /// How the error of a sample is correlated: as `said` of its edge, unless it was observed.

@@ -38,6 +38,22 @@ struct UnspecifiedEdge {
   std::string id;
 };
 
+/// A sample of an edge that drifts, at another instant than that of the answer, which is corrected
+/// together with the edge: its error is another row of the joint covariance.
+struct RowOfSample {
+  std::uint32_t segment = 0;
+  Time stamp{};
+  Transform X_PC;
+  PathCorrelation correlation{};
+};
+
+/// Which of these are asked for.
+enum class Rows : std::uint8_t {
+  kNone,
+  kOfPath,  ///< those without which the value at the instant cannot be corrected
+  kAll,     ///< all that are kept, as they are stored
+};
+
 /// The values of some segments at one instant.
 struct ValuesAtInstant {
   std::vector<Transform> values;  ///< one per segment
@@ -61,6 +77,7 @@ struct SegmentValues : ValuesAtInstant {
   bool cleared = false;
   /// They are those of no instant: an edge had no sample yet. Only of segments_since().
   bool unsampled = false;
+  std::vector<RowOfSample> rows{};  ///< of edges, the latest of each first
 };
 
 /// What was seen of segments: their values at a commit, at instants up to their newest one. Late

@@ -88,13 +88,23 @@ class EdgeCorrelation {
   const SharedCorrelation now_;
 };
 
+/// The place of a sample among those of an edge that drifts, in the joint covariance of what was
+/// observed. Stamps: INT64_MIN is none.
+struct RowInfo {
+  bool observed = false;  ///< itself; otherwise it follows from one that was
+  bool between = false;   ///< of an observation between two samples: none was given for the stamp
+  /// How long, and how many, rows are kept (sample_rows.hpp); 0: this one only.
+  std::uint8_t lasts = 0;
+  std::int64_t follows = INT64_MIN;  ///< stamp of the last observed sample, from which it follows
+  std::int64_t before = INT64_MIN;   ///< stamp of the row before this one that is kept, too
+};
+
 /// What an observation has made of a sample: its error is one row of the joint covariance of all
 /// that was observed then (a delayed state), while the samples around it stay as they were given.
 struct SampleRevision {
   Transform given;          ///< the sample before all observations
   Correlation correlation;  ///< of this sample, instead of what is said of the edge
-  bool observed = false;    ///< itself; otherwise it follows from one that was
-  bool between = false;     ///< of an observation between two samples: none was given for the stamp
+  RowInfo row{};
 };
 
 /// The same, for all who read the sample.
@@ -102,15 +112,12 @@ class SharedRevision {
  public:
   SharedRevision(Arena& arena, SampleRevision revision)
       : given(revision.given),
-        observed(revision.observed),
-        between(revision.between),
+        row(revision.row),
         shared_(arena, std::move(revision.correlation)),
         arena_(&arena) {}
 
   const Transform given;
-  // For the owner only, as in SampleRevision.
-  const bool observed;
-  const bool between;
+  const RowInfo row;  ///< for the owner only
   [[nodiscard]] const Correlation& correlation() const { return *shared_; }
   [[nodiscard]] const FlatCorrelation* const& flat() const { return shared_.flat(); }
   [[nodiscard]] std::size_t bytes() const { return sizeof(*this) + shared_.bytes(); }

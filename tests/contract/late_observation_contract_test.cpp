@@ -2,6 +2,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -59,29 +60,33 @@ class Line {
   void drive(int step) { REQUIRE(node_->update("base", Transform::exact({}), at(step))); }
 
   // Sees what it expects, so that only covariances change.
-  void see(int object, int step) {
+  void see(int object, int step, double sigma = kSighting) {
     const std::string id = name_of(object);
     Query query;
     query.at = at(step);
     const auto X = node_->lookup("base", id, query);
     REQUIRE(X);
-    const auto found =
-        node_->observe("base", id, {X->pose, on_line(kSighting * kSighting)}, at(step));
+    const auto found = node_->observe("base", id, {X->pose, on_line(sigma * sigma)}, at(step));
     REQUIRE(found);
     REQUIRE(found->accepted);
     Eigen::VectorXd H = Eigen::VectorXd::Zero(sigma_.rows());
     H(steps_ + object) = 1;
     H(step) = -1;
-    const Eigen::VectorXd gain = sigma_ * H / (H.dot(sigma_ * H) + kSighting * kSighting);
+    const Eigen::VectorXd gain = sigma_ * H / (H.dot(sigma_ * H) + sigma * sigma);
     sigma_ -= (gain * (H.transpose() * sigma_)).eval();
   }
 
-  // The variance that a lookup at the newest sample has, by that of the dense filter.
+  // The variance that a lookup has, by that of the dense filter.
   double ratio(const std::string& from, int object, int newest) {
+    return ratio(from, object, newest, newest);
+  }
+  double ratio(const std::string& from, int object, int newest, int step) {
     Eigen::VectorXd H = Eigen::VectorXd::Zero(sigma_.rows());
     H(steps_ + object) = 1;
-    if (from == "base") H(newest) = -1;
-    const auto X = node_->lookup(from, name_of(object), Query{}).value();
+    if (from == "base") H(step) = -1;
+    Query query;
+    if (step != newest) query.at = at(step);
+    const auto X = node_->lookup(from, name_of(object), query).value();
     return X.covariance.of_specified().upper()[0] / H.dot(sigma_ * H);
   }
 
@@ -95,13 +100,17 @@ class Line {
 constexpr double kMount = 0.02;      // of a camera [m]
 constexpr double kLocalized = 0.03;  // of each sample [m]
 
-// world -> base is localized anew in each sample; two cameras on it, and two objects in the world.
+// world -> base is localized anew in each sample, or drifts; two cameras on it, and two objects in
+// the world.
 class Cameras {
  public:
-  explicit Cameras(int steps) : sigma_(Eigen::MatrixXd::Zero(steps + 4, steps + 4)), steps_(steps) {
+  explicit Cameras(int steps, bool drifts = false)
+      : sigma_(Eigen::MatrixXd::Zero(steps + 4, steps + 4)), steps_(steps) {
     FrameSpec base{"base", "world", {along_x(0).pose, on_line(kLocalized * kLocalized)}};
     base.timing = EdgeTiming();
     base.timing->moving = true;
+    base.timing->drifts = drifts;
+    if (drifts) base.timing->process_noise = on_line(kGrows);
     const Transform mount{along_x(0).pose, on_line(kMount * kMount)};
     const Transform somewhere{along_x(1).pose, on_line(kMount * kMount)};
     node_.emplace(Node::open(network_.join(), "robot",
@@ -113,6 +122,10 @@ class Cameras {
                               {"right", "base", mount}})
                       .value());
     sigma_.diagonal().head(steps).setConstant(kLocalized * kLocalized);
+    for (int i = 0; drifts && i < steps * steps; ++i) {
+      const int first = std::min(i / steps, i % steps);
+      sigma_(i / steps, i % steps) = kLocalized * kLocalized + kGrows * kStep * first;
+    }
     sigma_.diagonal().tail(4).setConstant(kMount * kMount);
   }
 
@@ -195,6 +208,29 @@ TEST_CASE("late observations: a sample that is seen again makes nothing overconf
   CHECK(line.ratio("base", "left", kRounds) < 1.6);
 }
 
+TEST_CASE("late observations: two cameras, of which one is always later, tie nothing too much") {
+  const int late = GENERATE(1, 2, 5);
+  CAPTURE(late);
+  Cameras line(kRounds + 1, true);
+  for (int step = 0; step < late; ++step) line.localize(step);
+  for (int step = late; step <= kRounds; ++step) {
+    line.localize(step);
+    for (const char* object : {"near", "far"}) line.see("left", object, step);
+    for (const char* object : {"near", "far"}) line.see("right", object, step - late);
+    for (const auto& [a, b] :
+         {std::pair("world", "near"), std::pair("world", "base"), std::pair("base", "left"),
+          std::pair("base", "right"), std::pair("left", "right"), std::pair("near", "far"),
+          std::pair("left", "near"), std::pair("right", "far")}) {
+      CAPTURE(step, a, b, line.ratio(a, b, step));
+      CHECK(line.ratio(a, b, step) > 0.999);
+    }
+  }
+  for (const char* camera : {"left", "base"}) {
+    CAPTURE(line.ratio(camera, "right", kRounds));
+    CHECK(line.ratio(camera, "right", kRounds) < 1.3);
+  }
+}
+
 TEST_CASE("late observations: what a standing edge was observed with forgets no sample") {
   Cameras line(4);
   for (int step = 0; step < 4; ++step) line.localize(step);
@@ -230,11 +266,49 @@ TEST_CASE("late observations: out of order they never get overconfident") {
     line.see(0, step);
     line.see(1, step - late);
     line.see(0, step - late);
+    for (const int object : {0, 1}) {
+      CAPTURE(step, object, line.ratio("world", object, step), line.ratio("base", object, step));
+      CHECK(line.ratio("world", object, step) > 0.999);
+      CHECK(line.ratio("base", object, step) > 0.999);
+    }
   }
-  for (const int object : {0, 1}) {
-    CAPTURE(object, line.ratio("world", object, kRounds), line.ratio("base", object, kRounds));
-    CHECK(line.ratio("world", object, kRounds) > 0.95);
-    CHECK(line.ratio("base", object, kRounds) > 0.95);
+  // The first late ones, which saw from where the base was known exactly, count for less.
+  for (const int object : {0, 1}) CHECK(line.ratio("base", object, kRounds) < 1.1);
+}
+
+// From the first late one on, the last instants that were observed stay rows.
+TEST_CASE("late observations: of instants that are kept, and between them, they are exact") {
+  const int late = GENERATE(1, 2, 5);
+  CAPTURE(late);
+  Line line(kRounds + 1);
+  for (int step = 0; step <= kRounds; ++step) {
+    line.drive(step);
+    if (step % 3 != 0) line.see(0, step);
+    if (step == 5) line.see(0, step - late, 1e3);  // tells nothing
+    if (step < 5 + late) continue;
+    line.see(1, step - late);
+    line.see(0, step - late);
+    for (const int object : {0, 1}) {
+      CAPTURE(step, object);
+      CHECK(line.ratio("world", object, step) == Approx(1).margin(1e-5));
+      CHECK(line.ratio("base", object, step) == Approx(1).margin(1e-5));
+      CHECK(line.ratio("base", object, step, step - late) == Approx(1).margin(1e-5));
+    }
+  }
+}
+
+TEST_CASE("late observations: before all that is kept they never get overconfident") {
+  Line line(kRounds + 1);
+  for (int step = 0; step <= kRounds; ++step) line.drive(step);
+  line.see(0, kRounds);
+  for (int step = kRounds - 1; step > 0; step -= 2) {
+    line.see(1, step);
+    line.see(0, step);
+    for (const int object : {0, 1}) {
+      CAPTURE(step, object);
+      CHECK(line.ratio("world", object, kRounds) > 0.999);
+      CHECK(line.ratio("base", object, kRounds) > 0.999);
+    }
   }
 }
 

@@ -54,6 +54,7 @@ inline void check_same(const ReviseRequest& actual, const ReviseRequest& expecte
     REQUIRE(came.revision.has_value() == sent.revision.has_value());
     if (!came.revision) continue;
     CHECK(came.revision->id == sent.revision->id);
+    CHECK(came.revision->stamp == sent.revision->stamp);
     check_same(came.revision->X_PC, sent.revision->X_PC);
     CHECK(came.revision->correlation == sent.revision->correlation);
   }
@@ -178,6 +179,7 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(arrived.query.order == lookup.query.order);
     CHECK(arrived.hint == lookup.hint);
     CHECK(arrived.edges == lookup.edges);
+    CHECK(arrived.rows == lookup.rows);
     check_same(arrived.segments, lookup.segments);
   } else if (const auto* revise = std::get_if<ReviseRequest>(&expected.body)) {
     check_same(std::get<ReviseRequest>(actual.body), *revise);

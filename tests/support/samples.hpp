@@ -143,6 +143,18 @@ bool take(const Bytes& bytes) {
                      time_of(17),
                      18446744073709551615ULL,
                      kLastIncarnation}},
+      {44, "hand",
+       ReviseRequest{
+           {{"base", {1.5, 2.5, 3.5}, false, Revision{"base", random.transform(), {}, {}}},
+            {"base",
+             {},
+             false,
+             Revision{"base", random.transform(), correlation(random), time_of(9)}}},
+           time_of(17),
+           1,
+           2}},
+      {45, "hand", LookupRequest{{{"arm", "hand"}}, {}, {}, true, Rows::kOfPath}},
+      {46, "hand", LookupRequest{{{"arm", "hand"}}, {}, {}, true, Rows::kAll}},
       {17, "hand", ConsistencyRequest{true}},
       {18, "arm", JointUpdate{{{"elbow", 0.5, 1e-4}, {"wrist", -2.0, 0}}, time_of(18)}},
       {19, "arm", JointsRequest{}},
@@ -195,6 +207,14 @@ bool take(const Bytes& bytes) {
   return found;
 }
 
+[[nodiscard]] inline SegmentValues values_with_rows(Random& random) {
+  SegmentValues found = correlated_values(random);
+  const Correlation some = correlation(random);
+  found.rows = {{1, time_of(4), random.transform(), {{}, some.common_errors, {"hand"}}},
+                {1, time_of(3), random.transform(), {}}};
+  return found;
+}
+
 [[nodiscard]] inline HistoryInfo history_info(const std::string& id) {
   HistoryInfo history;
   history.id = id;
@@ -237,6 +257,7 @@ bool take(const Bytes& bytes) {
       {1, 10, Done{}, 1ULL << 62U},
       {2, kLastCounter, Error{Errc::kCycle, "no, \xc3\xa4 \x07 \xff"}},
       {3, 0, Error{Errc::kTransport, ""}},
+      {4, 31, values_with_rows(random)},
       {4, 30, SegmentValues{}},
       {5, 40,
        SegmentValues{{{random.transform(), Transform::exact({}), random.transform()}}, {}, {}, {}}},

@@ -96,8 +96,17 @@ constexpr auto kIncomplete = record(TFDUDE_FIELD_OF_ALL(found, kCorrelated),
                                     TFDUDE_FIELD_OF_ALL(unspecified, UnspecifiedEdges()),
                                     TFDUDE_FIELD(unspecified_at_hint, at_hint, UnspecifiedEdges()));
 
+constexpr auto kRow =
+    record(TFDUDE_FIELD(stamp, stamp, Instant()), TFDUDE_FIELD(segment, segment, Count32()),
+           TFDUDE_FIELD(x_pc, X_PC, ComputedTransform()),
+           TFDUDE_FIELD(edge_correlation, correlation, AnyCorrelation()));
+
+constexpr auto kWithRows = record(TFDUDE_FIELD_OF_ALL(found, kIncomplete),
+                                  TFDUDE_FIELD(rows, rows, List(kRow, kMaxCorrelated)));
+
+bool has_no_rows(const SegmentValues& found) { return found.rows.empty(); }
 bool is_complete(const SegmentValues& found) {
-  return found.unspecified.empty() && found.at_hint.unspecified.empty();
+  return has_no_rows(found) && found.unspecified.empty() && found.at_hint.unspecified.empty();
 }
 bool is_stamped(const SegmentValues& found) {
   return is_complete(found) && found.correlations.empty() && found.at_hint.correlations.empty();
@@ -227,9 +236,10 @@ constexpr auto kReplyBody =
           TFDUDE_CASE(8, std::vector<EdgeConsistency>, consistency, List(kConsistency)),
           TFDUDE_CASE(9, std::vector<JointInfo>, joint_states, FirstOf(List(kJoint))),
           SignOfLife<kAlive>(), TFDUDE_CASE(11, std::vector<KnownFrame>, structure, List(kFrame)),
-          TFDUDE_CASE(12, SegmentValues, incomplete, kIncomplete),
+          TFDUDE_CASE_IF(12, SegmentValues, incomplete, kIncomplete, &has_no_rows),
           TFDUDE_CASE(13, DescriptionPart, description, kDescriptionPart),
-          TFDUDE_CASE(14, MemoryOffer, memory, kMemory));
+          TFDUDE_CASE(14, MemoryOffer, memory, kMemory),
+          TFDUDE_CASE(15, SegmentValues, with_rows, kWithRows));
 
 constexpr auto kReply = record(
     TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),

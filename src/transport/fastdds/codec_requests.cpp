@@ -162,6 +162,40 @@ constexpr auto kRevise =
                  TFDUDE_FIELD(edges, edges, List(kRevisedEdge, kMaxCorrelated))),
           at_least_one(&ReviseRequest::edges, "an observation without edges"));
 
+// Those of several instants: the stamps of all edges.
+struct OfRows {
+  static void check(CdrReader& in) {
+    in.sequence(kMaxCorrelated, [&] { Instant::check(in); });
+  }
+  static void write(const std::vector<ReviseRequest::Edge>& edges,
+                    std::vector<std::int64_t>& wire) {
+    wire.clear();
+    for (const ReviseRequest::Edge& edge : edges) {
+      const auto stamp = edge.revision ? edge.revision->stamp : std::nullopt;
+      wire.push_back(stamp ? nanoseconds(*stamp) : -1);
+    }
+  }
+  static Result<void> read(const std::vector<std::int64_t>& wire,
+                           std::vector<ReviseRequest::Edge>& edges, const Place& place) {
+    if (wire.size() != edges.size()) {
+      return place.fail({Errc::kInvalidInput, std::to_string(wire.size()) + " stamps of " +
+                                                  std::to_string(edges.size()) + " edges"});
+    }
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+      if (wire[i] >= 0 && edges[i].revision) edges[i].revision->stamp = time_of(wire[i]);
+    }
+    return {};
+  }
+};
+
+bool is_of_one_instant(const ReviseRequest& revise) {
+  return std::none_of(revise.edges.begin(), revise.edges.end(),
+                      [](const auto& edge) { return edge.revision && edge.revision->stamp; });
+}
+
+constexpr auto kReviseRows =
+    record(TFDUDE_FIELD_OF_ALL(revised, kRevise), TFDUDE_FIELD(stamps, edges, OfRows()));
+
 // ---- questions
 
 constexpr auto kSegments =
@@ -187,11 +221,16 @@ struct OrderNumber : Octet {
 // What is asked of each segment.
 struct OfEdges : Octet {
   static void write(const LookupRequest& lookup, std::uint8_t& wire) {
-    wire = lookup.timed ? 2 : lookup.edges ? 1 : 0;
+    wire = lookup.timed                   ? 2
+           : lookup.rows == Rows::kOfPath ? 3
+           : lookup.rows == Rows::kAll    ? 4
+           : lookup.edges                 ? 1
+                                          : 0;
   }
   static Result<void> read(std::uint8_t wire, LookupRequest& lookup, const Place&) {
     lookup.edges = wire != 0;
     lookup.timed = wire == 2;
+    lookup.rows = wire == 3 ? Rows::kOfPath : wire == 4 ? Rows::kAll : Rows::kNone;
     return {};
   }
 };
@@ -254,7 +293,7 @@ constexpr auto kRequestBody = cases(
     TFDUDE_CASE_IF(6, LookupRequest, lookup, kLookup, &is_plain),
     TFDUDE_CASE(7, LookupRequest, lookup_at, kLookupAt),
     TFDUDE_CASE(8, WatchRequest, watch, kWatch), TFDUDE_CASE(9, HistoryRequest, history, kOfAll),
-    TFDUDE_CASE(10, ReviseRequest, revise, kRevise),
+    TFDUDE_CASE_IF(10, ReviseRequest, revise, kRevise, &is_of_one_instant),
     TFDUDE_CASE(11, ConsistencyRequest, consistency, kOfAll),
     TFDUDE_CASE(12, JointUpdate, joint_update, kJointUpdate),
     TFDUDE_CASE(13, JointsRequest, joint_states, kJointStates),
@@ -264,7 +303,8 @@ constexpr auto kRequestBody = cases(
     TFDUDE_CASE(18, FramesRequest, structure, kFrames),
     TFDUDE_CASE(19, DescriptionRequest, description, kDescriptionRequest),
     TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()),
-    TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite));
+    TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite),
+    TFDUDE_CASE(23, ReviseRequest, revise_rows, kReviseRows));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

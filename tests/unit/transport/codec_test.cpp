@@ -86,6 +86,13 @@ TEST_CASE("replies are decoded as they were encoded") {
       check_same(came.unspecified, values->unspecified);
       check_same(came.at_hint.unspecified, values->at_hint.unspecified);
       CHECK(came.commit == values->commit);
+      REQUIRE(came.rows.size() == values->rows.size());
+      for (std::size_t i = 0; i < came.rows.size(); ++i) {
+        CHECK(came.rows[i].segment == values->rows[i].segment);
+        CHECK(came.rows[i].stamp == values->rows[i].stamp);
+        check_same(came.rows[i].X_PC, values->rows[i].X_PC);
+        check_same(std::vector{came.rows[i].correlation}, std::vector{values->rows[i].correlation});
+      }
     } else if (const auto* pushed = std::get_if<PushedValues>(&one.body)) {
       check_same(std::get<PushedValues>(arrived->body), *pushed);
     } else if (const auto* all = std::get_if<std::vector<EdgeConsistency>>(&one.body)) {

@@ -108,7 +108,8 @@ ReviseRequest random_revision(Random& random) {
                 edge.refused = random.index(2) == 0;
                 if (random.index(2) == 0) {
                   edge.revision =
-                      Revision{edge.id, random_transform(random), random_correlation(random)};
+                      Revision{edge.id, random_transform(random), random_correlation(random), {}};
+                  if (random.index(2) == 0) edge.revision->stamp = random_stamp(random);
                 }
                 return edge;
               }),
@@ -136,9 +137,12 @@ std::vector<Request> random_requests(Random& random) {
                                    }),
                            random_stamp(random)});
   add(MoveRequest{named(), random_parts(random), random_count(random)});
-  const bool of_edges = random.index(2) == 0;
-  add(LookupRequest{random_segments(random, 0), query, random_stamp(random), of_edges,
-                    of_edges && random.index(2) == 0});
+  const std::size_t asked = random.index(5);
+  add(LookupRequest{random_segments(random, 0), query, random_stamp(random), asked > 0,
+                    asked == 3   ? Rows::kOfPath
+                    : asked == 4 ? Rows::kAll
+                                 : Rows::kNone,
+                    asked == 2});
   const std::size_t watched = random.index(3);
   add(WatchRequest{random_segments(random, 1), watched == 1, watched == 2,
                    std::chrono::nanoseconds(random.index(1000)), random_stamp(random)});
@@ -221,6 +225,11 @@ std::vector<Reply> random_replies(Random& random) {
   found.stamp = random_stamp(random);
   if (random.index(2) == 0) found.at_hint = random_values(random, segments);
   if (found.stamp) found.period = std::chrono::nanoseconds(random.index(1000));
+  for (std::size_t left = random.index(3); left > 0; --left) {
+    found.rows.push_back({static_cast<std::uint32_t>(random_count(random)),
+                          random_stamp(random).value_or(Time()), random.transform(),
+                          random_path_correlation(random)});
+  }
   add(found);
   add(random_pushed(random));
   add(several(random, 0, [&] {

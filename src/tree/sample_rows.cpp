@@ -1,0 +1,248 @@
+#include "tree/sample_rows.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
+#include "tfdude/math/interpolate.hpp"
+#include "tfdude/math/perturbation.hpp"
+
+#include "math/common_errors.hpp"
+#include "math/semidefinite.hpp"
+#include "math/square_root.hpp"
+#include "tree/revised_sample.hpp"
+
+namespace tfdude {
+namespace {
+
+const Correlation* said_of(const HeldVersion& edge) {
+  return edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+}
+
+// Null: there is none with that stamp any more.
+const Sample* sample_at(const HeldVersion& edge, std::int64_t t) {
+  if (t == edge.stamp) return edge.samples->sample(edge.number);
+  if (t == kAlways || t > edge.stamp) return nullptr;
+  std::uint64_t back = 0;
+  const Sample* found = edge.samples->around(t, edge.number, back).before;
+  return found != nullptr && found->stamp == t ? found : nullptr;
+}
+
+// The latest first.
+std::vector<const Sample*> rows_of(const HeldVersion& edge) {
+  std::vector<const Sample*> rows;
+  const Sample* row = last_observed(edge);
+  while (row != nullptr && rows.size() < kMostRows) {
+    rows.push_back(row);
+    row = sample_at(edge, row->revision()->row.before);
+    if (row != nullptr && row->revision() == nullptr) break;
+  }
+  return rows;
+}
+
+// Whether so many samples follow that to correct them all would take long. Then the newest one is
+// the next that is observed.
+bool is_long_ago(const HeldVersion& edge, const Sample& row) {
+  constexpr std::uint64_t kMany = 256;
+  const Sample* after = edge.number < kMany ? nullptr : edge.samples->sample(edge.number - kMany);
+  return after != nullptr && after->stamp > row.stamp;
+}
+
+// How the edge has moved from one instant to a later one, as it was told, and what the drift has
+// added at the later one.
+struct Way {
+  Pose increment;
+  Matrix6d added = Matrix6d::Zero();
+
+  [[nodiscard]] Matrix6d carry() const { return adjoint(increment.inverse()); }
+};
+
+Pose given_at(const HeldVersion& edge, std::int64_t t) {
+  if (const Sample* there = sample_at(edge, t)) return given(*there).pose;
+  std::uint64_t back = 0;
+  const auto [before, after] = edge.samples->around(t, edge.number, back);
+  Pose G_PC;
+  if (before == nullptr || after == nullptr) return G_PC;
+  const double s =
+      static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
+  interpolate(given(*before).pose, given(*after).pose, s, G_PC);
+  return G_PC;
+}
+
+// Sample by sample, as the values of the samples were computed.
+Way way_between(const HeldVersion& edge, std::int64_t from, std::int64_t to) {
+  std::vector<const Sample*> on_way;
+  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
+    const Sample* sample = edge.samples->sample(number);
+    if (sample == nullptr || sample->stamp <= from) break;
+    if (sample->stamp < to) on_way.push_back(sample);
+  }
+  const Matrix6d density = edge.samples->timing().process_noise.matrix();
+  Way way;
+  Pose here = given_at(edge, from);
+  std::int64_t now = from;
+  const auto go = [&](const Pose& next, std::int64_t then) {
+    const Pose step = here.inverse() * next;
+    const Matrix6d back = adjoint(step.inverse());
+    way.added =
+        (back * way.added * back.transpose() + static_cast<double>(then - now) * 1e-9 * density)
+            .eval();
+    way.increment = way.increment * step;
+    here = next;
+    now = then;
+  };
+  for (std::size_t i = on_way.size(); i-- > 0;) go(given(*on_way[i]).pose, on_way[i]->stamp);
+  go(given_at(edge, to), to);
+  return way;
+}
+
+std::vector<CommonError> times(const Matrix6d& factor, std::vector<CommonError> common_errors) {
+  for (CommonError& one : common_errors) one.loading = (factor * one.loading).eval();
+  return common_errors;
+}
+
+RowOfSample as_stored(const Sample& sample, std::size_t segment, const Correlation* said) {
+  RowOfSample row{static_cast<std::uint32_t>(segment), time_of(sample.stamp), sample.value(), {}};
+  const Correlation* correlation = correlation_at(sample, said);
+  if (correlation == nullptr) return row;
+  row.correlation.common_errors = correlation->common_errors;
+  row.correlation.observed_with = correlation->observed_with;
+  return row;
+}
+
+// Its own part becomes an error that others may have in common with it. Its name is one that no
+// other sample, and no other value of this one, has anywhere.
+void share_own(const HeldVersion& edge, const Sample& sample, RowOfSample& row) {
+  Loading root = root_of(row.X_PC.covariance.of_specified().matrix());
+  if (root.cols() == 0) return;
+  const auto text = [](auto number) { return std::to_string(number); };
+  row.correlation.common_errors.push_back(
+      {std::string(kObservedPrefix) + "@" + text(std::hash<std::string_view>()(edge.name->text)) +
+           "." + text(sample.commit) + "." + text(sample.stamp),
+       false, std::move(root)});
+  row.X_PC.covariance = Covariance();
+}
+
+// A value at an instant beside some rows.
+struct Tied {
+  Pose X_PC;
+  Matrix6d own = Matrix6d::Zero();
+  bool unknown = false;
+  std::vector<CommonError> common_errors;
+};
+
+Tied after_row(const RowOfSample& row, const Way& way) {
+  return {row.X_PC.pose * way.increment, way.added, false,
+          times(way.carry(), row.correlation.common_errors)};
+}
+
+Tied between_rows(const RowOfSample& first, const Way& to, const Way& from,
+                  const RowOfSample& second) {
+  const Matrix6d F = from.carry();
+  const Matrix6d with_second = to.added * F.transpose();
+  const Matrix6d K = with_second * pseudo_inverse(F * with_second + from.added);
+  const Pose forward = first.X_PC.pose * to.increment;
+  const Twist missed = log((forward * from.increment).inverse() * second.X_PC.pose);
+  Tied tied{forward * exp(Twist(K * missed)),
+            nearest_semidefinite(to.added - K * with_second.transpose()), false,
+            times((Matrix6d::Identity() - K * F) * to.carry(), first.correlation.common_errors)};
+  add_errors(times(K, second.correlation.common_errors), tied.common_errors);
+  return tied;
+}
+
+Tied before_row(const Way& way, const RowOfSample& row) {
+  const Pose back = way.increment.inverse();
+  const Matrix6d F = adjoint(way.increment);
+  return {row.X_PC.pose * back, F * way.added * F.transpose(), !way.added.isZero(0),
+          times(F, row.correlation.common_errors)};
+}
+
+void set_value(const Tied& tied, std::size_t i, SegmentValues& found) {
+  found.values[i] = {tied.X_PC, Covariance::trusted(tied.own)};
+  auto& without = found.unspecified;
+  without.erase(std::remove_if(without.begin(), without.end(),
+                               [&](const UnspecifiedEdge& edge) { return edge.segment == i; }),
+                without.end());
+  PathCorrelation& correlation = found.correlations[i];
+  correlation.common_errors = tied.common_errors;
+  correlation.unknown.reset();
+  if (!tied.unknown) return;
+  correlation.unknown = Covariance::trusted(tied.own);
+  found.values[i].covariance = Covariance();
+}
+
+// Of an edge whose last row cannot be corrected with it, as its error is of unknown correlation.
+void forget_correlation(std::size_t i, SegmentValues& found) {
+  PathCorrelation& correlation = found.correlations[i];
+  const Belief all = belief_of(found.values[i], correlation);
+  const bool complete = !all.unspecified;
+  correlation.unknown = collapse(all).covariance.of_specified();
+  correlation.common_errors.clear();
+  found.values[i].covariance = Covariance();
+  found.values[i].covariance.set_complete(complete);
+}
+
+}  // namespace
+
+const Sample* last_observed(const HeldVersion& edge) {
+  const Sample* newest = edge.samples->sample(edge.number);
+  if (newest == nullptr || newest->revision() == nullptr) return nullptr;
+  const Sample* row = sample_at(edge, newest->revision()->row.follows);
+  return row != nullptr && row->revision() != nullptr ? row : nullptr;
+}
+
+std::size_t observed_since(const HeldVersion& edge, std::int64_t t) {
+  std::size_t count = 0;
+  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
+    const Sample* sample = edge.samples->sample(number);
+    if (sample == nullptr || sample->stamp <= t || count == kMostRows) break;
+    if (sample->revision() != nullptr && sample->revision()->row.observed) ++count;
+  }
+  return count;
+}
+
+std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::size_t segment,
+                                                  std::int64_t t, Rows asked,
+                                                  SegmentValues& found) {
+  if (asked == Rows::kNone || !edge.samples->timing().drifts || t > edge.stamp) return std::nullopt;
+  const std::vector<const Sample*> rows = rows_of(edge);
+  if (rows.empty()) return std::nullopt;
+  const Sample& last = *rows.front();
+  const bool later = t > last.stamp;
+  const bool alone = later && last.revision()->row.lasts == 0;
+  if (alone && (asked == Rows::kOfPath || is_long_ago(edge, last))) return std::nullopt;
+  const Correlation* said = said_of(edge);
+  const Correlation& correlation = last.revision()->correlation();
+  if (correlation.unknown || !last.complete()) {
+    if (asked == Rows::kOfPath && t < last.stamp) forget_correlation(segment, found);
+    return correlation.observed_with;
+  }
+  std::vector<RowOfSample> told;
+  for (const Sample* row : rows) told.push_back(as_stored(*row, segment, said));
+  const auto there =
+      std::find_if(rows.begin(), rows.end(), [&](const Sample* row) { return row->stamp <= t; });
+  const auto k = static_cast<std::size_t>(there - rows.begin());
+  const std::size_t kept = (last.revision()->row.lasts + kRowLasts - 1) / kRowLasts;
+  // After an observation in order there is one more, until the next.
+  const std::size_t most = asked == Rows::kAll ? kept + 1 : std::max(kept, later ? 1 : k + 1);
+  if (told.size() > most) told.resize(most);
+  if (asked == Rows::kOfPath && k < rows.size() && rows[k]->stamp == t) {
+    told.erase(told.begin() + static_cast<std::ptrdiff_t>(k));
+  } else if (asked == Rows::kOfPath) {
+    if (k < rows.size()) share_own(edge, *rows[k], told[k]);
+    if (k > 0) share_own(edge, *rows[k - 1], told[k - 1]);
+    const auto way_to = [&] { return way_between(edge, rows[k]->stamp, t); };
+    const auto way_from = [&] { return way_between(edge, t, rows[k - 1]->stamp); };
+    const Tied tied = k == 0             ? after_row(told[0], way_to())
+                      : k == rows.size() ? before_row(way_from(), told[k - 1])
+                                         : between_rows(told[k], way_to(), way_from(), told[k - 1]);
+    set_value(tied, segment, found);
+  }
+  found.rows.insert(found.rows.end(), std::make_move_iterator(told.begin()),
+                    std::make_move_iterator(told.end()));
+  return correlation.observed_with;
+}
+
+}  // namespace tfdude

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tree/held_edge.hpp"
+#include "tree/segments.hpp"
+
+// An edge that drifts, observed at several instants in any order. Its errors at these instants are
+// rows of one joint covariance (delayed states): an observation at one of them corrects all.
+namespace tfdude {
+
+/// How many instants are kept as rows, at most. An observation costs that many more edges.
+inline constexpr std::size_t kMostRows = 8;
+
+/// For how many instants that are observed in order each row is kept longer than the one before it,
+/// after an observation that needed it. Before the first late observation there is only one row,
+/// which costs nothing.
+inline constexpr std::size_t kRowLasts = 31;
+
+/// RowInfo::lasts of so many rows.
+[[nodiscard]] constexpr std::uint8_t lasting(std::size_t rows) {
+  return static_cast<std::uint8_t>(kRowLasts * std::min(rows, kMostRows));
+}
+static_assert(lasting(kMostRows) == kRowLasts * kMostRows);
+
+/// The newest sample that was observed itself; null: none. From it the edge's newest value follows.
+[[nodiscard]] const Sample* last_observed(const HeldVersion& edge);
+
+/// At how many instants after this one, up to kMostRows, the edge was observed.
+[[nodiscard]] std::size_t observed_since(const HeldVersion& edge, std::int64_t t);
+
+/// Adds the rows of an edge that drifts to what was found of it at an instant, and makes the
+/// value there one that is correlated with them. Between two rows it is tied to both, as the walk
+/// in between is known (a Brownian bridge). Before the first row only that is known by how much the
+/// edge may have drifted until then, but not how this is correlated with what was seen since: it
+/// counts as of unknown correlation.
+/// @param segment  of `found`, whose value at the instant was looked up
+/// @return the edges that it was observed with; empty: the value stays, and there are no rows
+[[nodiscard]] std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge,
+                                                                std::size_t segment, std::int64_t t,
+                                                                Rows asked, SegmentValues& found);
+
+}  // namespace tfdude
