@@ -72,6 +72,19 @@ bool Writer::wait_until_matched(Deadline deadline) {
   return matched_.wait_until(lock, deadline, [this] { return readers_ > 0; });
 }
 
+std::vector<PeerId> Writer::readers() const {
+  const Lock lock(mutex_);
+  std::vector<PeerId> readers;
+  for (const auto& [reader, before_it] : readers_before_) readers.push_back(reader);
+  return readers;
+}
+
+void Writer::wait_for_readers(Deadline deadline) {
+  Lock lock(mutex_);
+  const int before = readers_;
+  matched_.wait_until(lock, deadline, [&] { return readers_ != before; });
+}
+
 bool Writer::write(void* sample) {
   if (!good()) return false;
   // Sequence numbers and source timestamps are assigned in the same order.

@@ -83,6 +83,11 @@ class Writer final : public edds::DataWriterListener {
   /// A sample of the topic's type. Thread-safe.
   bool write(void* sample);
 
+  /// The participants whose readers are matched.
+  [[nodiscard]] std::vector<PeerId> readers() const;
+  /// Waits for another match, or the end of one.
+  void wait_for_readers(Deadline deadline);
+
   /// Since when a reader has been discovered, without a pause; only while matched().
   [[nodiscard]] Deadline matched_at() const { return matched_at_.load(std::memory_order_relaxed); }
 

@@ -78,6 +78,8 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const Server& server = known->second;
   if (server.said() != nullptr && !server.silent) gone_(*server.said(), {});
   servers_.erase(known);
+  any_overtaken_ = std::any_of(servers_.begin(), servers_.end(),
+                               [](const auto& one) { return one.second.overtaken; });
 }
 
 void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
@@ -188,8 +190,12 @@ void Peers::overtake(const Presence& later) {
   if (!later.serving) return;
   for (auto& [id, server] : servers_) {
     const Presence* said = server.said();
-    server.overtaken = server.overtaken || (said != nullptr && said->partition == later.partition &&
-                                            said->incarnation < later.incarnation);
+    if (said == nullptr || said->partition != later.partition ||
+        said->incarnation >= later.incarnation) {
+      continue;
+    }
+    server.overtaken = true;
+    any_overtaken_ = true;
   }
 }
 

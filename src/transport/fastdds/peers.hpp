@@ -106,6 +106,8 @@ class Peers {
 
   /// Whether a server is silent, and a later process serves its partition, or has.
   [[nodiscard]] bool replaced(const PeerId& peer) const;
+  /// False while replaced() holds for nobody. O(1).
+  [[nodiscard]] bool any_replaced() const { return any_overtaken_.load(std::memory_order_relaxed); }
 
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
   /// announced what they serve, and none hears more others than this participant knows.
@@ -148,6 +150,7 @@ class Peers {
   std::map<PeerId, IncompatiblePeer> incompatible_ TFDUDE_GUARDED_BY(mutex_);
   std::set<std::string> logged_ TFDUDE_GUARDED_BY(mutex_);  // of these
   std::atomic<bool> any_incompatible_{false};
+  std::atomic<bool> any_overtaken_{false};
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
   // Set once, before anybody is discovered.

@@ -86,7 +86,18 @@ Result<void> Senders::send(Writer& writer, const std::string& partition, void* s
 Result<void> Senders::await_match(Writer& writer, const std::string& partition, Deadline deadline) {
   if (!writer.good()) return writer.check();
   parts_.attention.pay(writer);
-  while (!writer.wait_until_matched(std::min(deadline, Peers::Clock::now() + kWaitStep))) {
+  const auto step = [deadline] { return std::min(deadline, Peers::Clock::now() + kWaitStep); };
+  // What a former process alone would get would be lost.
+  const auto reaches = [&] {
+    if (!writer.wait_until_matched(step())) return false;
+    if (!parts_.peers.any_replaced()) return true;
+    const auto readers = writer.readers();
+    const auto is_former = [&](const PeerId& peer) { return parts_.peers.replaced(peer); };
+    if (!std::all_of(readers.begin(), readers.end(), is_former)) return true;
+    writer.wait_for_readers(step());
+    return false;
+  };
+  while (!reaches()) {
     if (parts_.peers.silent(partition)) {
       return fail(Errc::kUnreachable,
                   "partition " + quote(partition) + " left before it was discovered");
