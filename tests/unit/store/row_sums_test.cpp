@@ -23,7 +23,7 @@ using testing::ContainsSubstring;
 using testing::outcome;
 using testing::Random;
 using testing::TemporaryDirectory;
-using Rows = std::vector<std::string>;
+using TestRows = std::vector<std::string>;
 
 constexpr Time kStamp{std::chrono::nanoseconds(1'795'000'000'123'456'789)};
 
@@ -139,7 +139,7 @@ TEST_CASE("a changed value is named, and left out if that is wished") {
   CHECK(content(saved.file) == before);
   const auto dropped = drop_wrong_rows(saved.file, "arms");
   REQUIRE(dropped);
-  if (sql.find("'hanf'") == std::string::npos) CHECK(*dropped == Rows{row});
+  if (sql.find("'hanf'") == std::string::npos) CHECK(*dropped == TestRows{row});
   const auto store = open_sqlite_store(saved.file, "arms");
   REQUIRE(store);
   const auto state = (*store)->load();
