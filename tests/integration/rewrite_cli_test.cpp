@@ -88,7 +88,11 @@ TEST_CASE("rewrite: the files and commands of the page, and what a recording the
   const Slam slam;
   const std::string recorded = slam.directory.path() + "/robot.mcap";
   const Process recorder = slam.domain.start_cli({"record", recorded});
-  REQUIRE(eventually([&] { return slam.domain.cli({"info", recorded}).status == 0; }));
+  // Samples from before the recorder's watch began are not recorded.
+  REQUIRE(eventually([&] {
+    return slam.domain.cli({"frames", "--recording", recorded}).out.find("odom") !=
+           std::string::npos;
+  }));
   slam.write("measured.csv", measured());
   slam.write("corrected.csv", block("csv"));
   std::istringstream lines(block("sh"));
