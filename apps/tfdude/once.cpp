@@ -58,19 +58,20 @@ void add_options(CLI::App& app, Typed& typed) {
   exists->callback([&typed] { typed.exists = true; });
 }
 
-int print(const std::string& text) {
+int print_answer(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   return cli::status_with_output("tfdude", cli::kDone);
 }
 
 int answer_exists(const Typed& typed) {
-  return print(typed.json ? cli::dump({{"id", typed.path.a}, {"exists", true}}) + "\n" : "yes\n");
+  return print_answer(typed.json ? cli::dump({{"id", typed.path.a}, {"exists", true}}) + "\n"
+                                 : "yes\n");
 }
 
 int answer_lookup(const Typed& typed, const OneShotAnswer& found, Time now) {
   cli::PathFacts facts;
   facts.path = found.path;
-  if (typed.json) return print(cli::dump(typed.path.json(found.X_AB, facts)) + "\n");
+  if (typed.json) return print_answer(cli::dump(typed.path.json(found.X_AB, facts)) + "\n");
   // The age is not known if the stamps are of another clock.
   const bool same = std::all_of(found.path.begin(), found.path.end(), [](const PathSegment& one) {
     return !one.clock || *one.clock == ClockKind::kSystem;
@@ -79,7 +80,8 @@ int answer_lookup(const Typed& typed, const OneShotAnswer& found, Time now) {
     facts.stamp =
         cli::describe_stamp(*found.X_AB.stamp, same ? std::optional<Time>(now) : std::nullopt);
   }
-  return print(typed.path.text(found.X_AB, facts, typed.angles) + cli::describe(found.X_AB.basis));
+  return print_answer(typed.path.text(found.X_AB, facts, typed.angles) +
+                      cli::describe(found.X_AB.basis));
 }
 
 // The exit status; none: the whole program has to answer.

@@ -32,4 +32,11 @@ inline void widen(Loading& loading, Eigen::Index columns) {
 /// Adds errors, source by source and column by column.
 void add_errors(const std::vector<CommonError>& more, std::vector<CommonError>& sum);
 
+/// The errors of a value that is this multiple of another one.
+[[nodiscard]] inline std::vector<CommonError> times(const Matrix6d& factor,
+                                                    std::vector<CommonError> common_errors) {
+  for (CommonError& one : common_errors) one.loading = (factor * one.loading).eval();
+  return common_errors;
+}
+
 }  // namespace tfdude

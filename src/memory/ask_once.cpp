@@ -8,7 +8,7 @@ namespace tfdude {
 namespace {
 
 // On an idle computer it takes 0.1 ms.
-constexpr std::chrono::milliseconds kAnswerIn{10};
+constexpr std::chrono::milliseconds kAnswerOnceIn{10};
 
 // One may know what another one does not, such as of its own joints.
 constexpr int kMostAsked = 4;
@@ -17,7 +17,7 @@ constexpr int kMostAsked = 4;
 
 std::optional<OneShotAnswer> ask_once(const std::string& network, const OneShotQuestion& question) {
   using Clock = std::chrono::steady_clock;
-  const auto end = Clock::now() + kAnswerIn;
+  const auto end = Clock::now() + kAnswerOnceIn;
   const std::string message = one_shot_message(question);
   int asked = 0;
   for (int number = 0; number < kOneShotNames && asked < kMostAsked; ++number) {

@@ -22,9 +22,9 @@ using Clock = std::chrono::steady_clock;
 // How many are listened to at once; others wait for one of these to leave.
 constexpr std::size_t kMostAsking = 16;
 // How long they may take to ask.
-constexpr std::chrono::milliseconds kPatience{50};
+constexpr std::chrono::milliseconds kPatienceWithAsker{50};
 // How long nobody is admitted if that is not possible.
-constexpr std::chrono::milliseconds kRest{100};
+constexpr std::chrono::milliseconds kRestFromAskers{100};
 
 class LinuxOneShotSocket final : public OneShotSocket {
  public:
@@ -56,7 +56,7 @@ class LinuxOneShotSocket final : public OneShotSocket {
       polled.assign(1, {wake_.get(), POLLIN, 0});
       polled.push_back({rests || full ? -1 : listening_.get(), POLLIN, 0});
       for (const Asking& one : asking_) polled.push_back({one.socket.get(), POLLIN, 0});
-      const auto most = (rests ? kRest : kPatience).count();
+      const auto most = (rests ? kRestFromAskers : kPatienceWithAsker).count();
       const int wait = rests || !asking_.empty() ? static_cast<int>(most) : -1;
       (void)poll(polled.data(), static_cast<nfds_t>(polled.size()), wait);
       if (polled[0].revents != 0) return;
@@ -85,9 +85,9 @@ class LinuxOneShotSocket final : public OneShotSocket {
     Descriptor called = accept_one(listening_);
     if (!called.valid()) {
       // Without a free descriptor the caller would be reported again and again.
-      if (errno != EAGAIN) admits_from_ = Clock::now() + kRest;
+      if (errno != EAGAIN) admits_from_ = Clock::now() + kRestFromAskers;
     } else if (is_of_this_user(called)) {
-      asking_.push_back({std::move(called), Clock::now() + kPatience});
+      asking_.push_back({std::move(called), Clock::now() + kPatienceWithAsker});
     }
   }
 

@@ -26,11 +26,6 @@ Belief belief_of(const Sample& sample, const Correlation* said) {
   return belief;
 }
 
-std::vector<CommonError> times(const Matrix6d& factor, std::vector<CommonError> common_errors) {
-  for (CommonError& one : common_errors) one.loading = (factor * one.loading).eval();
-  return common_errors;
-}
-
 // The covariance of X is that of the whole error, of which the common errors are a part.
 CorrelatedValue split(Transform X, std::vector<CommonError> common_errors, bool unknown) {
   Matrix6d own = X.covariance.of_specified().matrix();

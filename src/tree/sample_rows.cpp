@@ -98,11 +98,6 @@ Way way_between(const HeldVersion& edge, std::int64_t from, std::int64_t to) {
   return way;
 }
 
-std::vector<CommonError> times(const Matrix6d& factor, std::vector<CommonError> common_errors) {
-  for (CommonError& one : common_errors) one.loading = (factor * one.loading).eval();
-  return common_errors;
-}
-
 RowOfSample as_stored(const Sample& sample, std::size_t segment, const Correlation* said) {
   RowOfSample row{static_cast<std::uint32_t>(segment), time_of(sample.stamp), sample.value(), {}};
   const Correlation* correlation = correlation_at(sample, said);
