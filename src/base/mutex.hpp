@@ -33,7 +33,8 @@ enum class LockRank : unsigned char {
   kPlanning,    ///< of a stream: finding the owners
   kSending,     ///< of a stream
   kAnnouncing,  ///< what a transport has announced
-  kChannels,    ///< creating a transport's readers and writers; then come the locks of Fast DDS
+  kChannels,    ///< a transport's readers and writers
+  kEndpoints,   ///< creating and deleting them; then come the locks of Fast DDS
   kReceiving,   ///< one sample after the other; handlers are called with it
   kReporting,   ///< presences and losses, in order; handlers are called with it
   kStructure,   ///< Structure::mutex

@@ -40,6 +40,11 @@ bool creation_fails(const std::string& what) {
   return fails && fails(what);
 }
 
+Mutex& endpoints_change() {
+  static Mutex mutex{LockRank::kEndpoints};
+  return mutex;
+}
+
 tl::unexpected<Error> not_created(const std::string& what) {
   return fail(Errc::kTransport, "Fast DDS could not create " + what);
 }

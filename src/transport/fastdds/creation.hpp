@@ -6,6 +6,8 @@
 
 #include "tfdude/base/result.hpp"
 
+#include "base/mutex.hpp"
+
 // The creation of DDS entities, which may fail: the library then returns null.
 namespace tfdude::fastdds {
 
@@ -21,6 +23,12 @@ void fail_creations(FailCreation fails);
 
 /// Logs what does not happen because of that, the 1st, 2nd, 4th, 8th... time.
 void log_not_created(const char* consequence, const Error& error);
+
+/// Hold it while an endpoint is created or deleted, and never in a callback of Fast DDS. All endpoints
+/// of a topic in a process share a pool of memory. Who creates one looks whether the pool is there,
+/// and only then takes hold of it (2.9's TopicPayloadPoolRegistry); if the last endpoint is deleted
+/// between the two, Fast DDS follows a null pointer.
+[[nodiscard]] Mutex& endpoints_change();
 
 /// All entities are created through this. @return kTransport, with what could not be created
 template <class Create>

@@ -50,6 +50,7 @@ Writer::Writer(const Context& context, edds::Topic& topic, const std::string& pa
           .and_then([&](edds::Publisher* publisher) {
             publisher_ = publisher;
             return created(name, [&] {
+              const Lock lock(endpoints_change());
               return publisher->create_datawriter(
                   &topic, context.profiles.writer(*publisher, profile), this);
             });
@@ -63,6 +64,7 @@ Writer::Writer(const Context& context, edds::Topic& topic, const std::string& pa
 Writer::~Writer() {
   context_.announced.writers.deleted(number_);
   const Gate::Pause pause(context_.gate);
+  const Lock lock(endpoints_change());
   if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --context_.counters.writers;
   if (publisher_ != nullptr) context_.participant.delete_publisher(publisher_);
 }

@@ -182,6 +182,7 @@ class Reader : public edds::DataReaderListener {
                  .and_then([&](edds::Subscriber* subscriber) {
                    subscriber_ = subscriber;
                    return created(name, [&] {
+                     const Lock lock(endpoints_change());
                      return subscriber->create_datareader(
                          &topic, context.profiles.reader(*subscriber, profile), this);
                    });
@@ -201,6 +202,7 @@ class Reader : public edds::DataReaderListener {
   void close() {
     context_.announced.readers.deleted(std::exchange(number_, EndpointNumbers::kNone));
     const Gate::Pause pause(context_.gate);
+    const Lock lock(endpoints_change());
     if (reader_ != nullptr) subscriber_->delete_datareader(reader_);
     if (subscriber_ != nullptr) context_.participant.delete_subscriber(subscriber_);
     reader_ = nullptr;
