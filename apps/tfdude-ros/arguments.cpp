@@ -19,9 +19,9 @@ namespace tfdude::ros {
 namespace {
 
 // The options that say the same as the configuration, and have priority over it.
-class Options {
+class CommandLine {
  public:
-  explicit Options(CLI::App& app) {
+  explicit CommandLine(CLI::App& app) {
     app.add_option("--config", config_, "YAML file; the options below have priority");
     partition_ = app.add_option("--partition", given_.partition,
                                 "the partition of the frames of /tf (default: ros)");
@@ -122,11 +122,11 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
       "cannot start, 2 wrong usage or configuration.\n"
       "Example: tfdude-ros --domain 7 --ros-domain 0 --export arm");
   app.set_version_flag("--version", version_line());
-  Options options(app);
+  CommandLine command_line(app);
   cli::add_network_options(app, settings.options);
   if (const auto status = cli::read_command_line(app, argc, argv)) return status;
   auto read = read_environment(cli::environment, settings);
-  if (read) read = options.apply(settings);
+  if (read) read = command_line.apply(settings);
   if (read) return std::nullopt;
   std::fprintf(stderr, "tfdude-ros: %s\n", read.error().message.c_str());
   return cli::kWrongUsage;

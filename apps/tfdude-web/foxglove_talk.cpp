@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 // A client that has so much to take yet gets no picture.
-constexpr std::size_t kBehind = std::size_t{1} << 20U;  // [B]
+constexpr std::size_t kFoxgloveBehind = std::size_t{1} << 20U;  // [B]
 constexpr std::size_t kMostSubscriptions = 1000;
 // Ellipsoids are as large as transforms and change less: every so many pictures.
 constexpr int kSceneEvery = 6;
@@ -59,7 +59,7 @@ class FoxgloveTalk final : public Talk {
   }
 
   void tick() override {
-    if (link_->waiting() > kBehind) return;
+    if (link_->waiting() > kFoxgloveBehind) return;
     tell_pairs();
     send_transforms();
     send_scene();

@@ -12,7 +12,7 @@ namespace tfdude::web {
 namespace {
 
 // A page that has so much to take yet gets no picture.
-constexpr std::size_t kBehind = std::size_t{256} << 10U;  // [B]
+constexpr std::size_t kPageBehind = std::size_t{256} << 10U;  // [B]
 // Covariances change slowly and are large: every so many pictures.
 constexpr int kCovarianceEvery = 15;
 // A page may change its pair so often; of wishes in between, the last one counts. Each pair is
@@ -59,7 +59,7 @@ class PageTalk final : public Talk {
 
   void tick() override {
     take_wish();
-    if (link_->waiting() > kBehind) return;
+    if (link_->waiting() > kPageBehind) return;
     send_structure();
     send_events();
     send_status();

@@ -27,8 +27,6 @@ py::array view(const double* first, py::ssize_t count, py::handle owner) {
   return array;
 }
 
-// A pose is four numbers of the quaternion, then three of the translation.
-constexpr std::size_t kPoseNumbers = 7;
 static_assert(std::is_standard_layout_v<Pose> && sizeof(Pose) == kPoseNumbers * sizeof(double));
 const double* numbers(const Pose& pose) {
   return reinterpret_cast<const double*>(&pose);  // the address of its first member

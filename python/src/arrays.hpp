@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <initializer_list>
 #include <vector>
 
@@ -17,6 +18,10 @@ namespace py = pybind11;
 /// Numbers of any kind, order and strides, as an array of contiguous doubles: the caller's own if
 /// it is one, else a copy.
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// How many a row of an array has: a pose's quaternion, then its translation; a covariance's rows.
+inline constexpr py::ssize_t kPoseNumbers = 7;
+inline constexpr std::size_t kCovarianceNumbers = 36;
 
 /// @param shape  -1: any length
 /// @param what  the name in messages

@@ -11,9 +11,6 @@
 namespace tfdude::python {
 namespace {
 
-constexpr py::ssize_t kPoseNumbers = 7;
-constexpr std::size_t kCovarianceNumbers = 36;
-
 template <class T>
 T of_row(Result<T>&& result, std::size_t row) {
   if (!result)

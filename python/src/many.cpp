@@ -15,8 +15,6 @@
 namespace tfdude::python {
 namespace {
 
-constexpr py::ssize_t kPoseNumbers = 7;
-constexpr std::size_t kCovarianceNumbers = 36;
 /// The stamp of a transform that holds for all times; no instant is negative.
 constexpr std::int64_t kNoStamp = -1;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();

@@ -21,7 +21,7 @@ struct Watching {
   std::shared_ptr<Endings> endings;
 };
 using Path = Watching<PathWatch>;
-using Edges = Watching<EdgesWatch>;
+using WatchedEdges = Watching<EdgesWatch>;
 using Listening = Ending<Subscription>;
 
 /// In slices, so that signals and the end of the interpreter are noticed.
@@ -147,11 +147,11 @@ void bind_path(py::module_& module, ClientClass& client) {
 }
 
 void bind_edges(py::module_& module, ClientClass& client) {
-  py::class_<Edges> cls(module, "EdgesWatch",
-                        "Edges whose owners push their changes; see Client.watch_edges().");
+  py::class_<WatchedEdges> cls(module, "EdgesWatch",
+                               "Edges whose owners push their changes; see Client.watch_edges().");
   cls.def(
       "lookup",
-      [](const Edges& self, const std::string& a, const std::string& b, py::handle at,
+      [](const WatchedEdges& self, const std::string& a, const std::string& b, py::handle at,
          py::handle extrapolate, py::handle age_noise_until, int order) {
         return value_of(self.watch.lookup(a, b, to_query(at, extrapolate, age_noise_until, order)));
       },

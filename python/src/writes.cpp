@@ -86,10 +86,11 @@ struct Streaming {
   Names names;
   Stream stream;
 };
-using Edges = Streaming<EdgeStream>;
+using StreamedEdges = Streaming<EdgeStream>;
 using Joints = Streaming<JointStream>;
 
-py::list publish_edges(Edges& edges, py::handle poses, py::handle covariances, py::handle stamp) {
+py::list publish_edges(StreamedEdges& edges, py::handle poses, py::handle covariances,
+                       py::handle stamp) {
   check_usable();
   const std::vector<Transform> X = to_transforms(poses, covariances, edges.names.size());
   return not_sent(edges.stream.try_publish(X, to_stamp(stamp, "stamp")), edges.names);
@@ -110,8 +111,9 @@ void bind_streams(py::module_& module, ClientClass& cls) {
   constexpr const char* kReturns =
       "Never waits. Returns what was not sent, as (name, code, partition); empty: everything was\n"
       "handed to the transport.";
-  py::class_<Edges>(module, "EdgeStream",
-                    "Streams edge values without acknowledgement. For one thread at a time.")
+  py::class_<StreamedEdges>(
+      module, "EdgeStream",
+      "Streams edge values without acknowledgement. For one thread at a time.")
       .def("publish", &publish_edges, py::arg("poses"), py::arg("covariances") = py::none(),
            py::arg("stamp") = py::none(), kReturns);
   py::class_<Joints>(module, "JointStream",
@@ -122,7 +124,7 @@ void bind_streams(py::module_& module, ClientClass& cls) {
       "stream",
       [](const Session& session, const Names& ids) {
         auto stream = session.call([&](Client& c) { return c.stream(ids); });
-        return std::make_unique<Edges>(Edges{ids, value_of(std::move(stream))});
+        return std::make_unique<StreamedEdges>(StreamedEdges{ids, value_of(std::move(stream))});
       },
       py::arg("ids"), "Opens a stream of edges, for loops of 1 kHz and more.");
   cls.def(

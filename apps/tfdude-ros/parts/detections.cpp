@@ -11,17 +11,17 @@ namespace {
 using Clock = cli::Worker::Clock;
 
 // How long a sighting waits for the path to the camera at its instant.
-constexpr Milliseconds kPatience{500};
+constexpr Milliseconds kCameraPatience{500};
 
 // How often it is checked which frames are to be removed.
-constexpr std::chrono::milliseconds kLookEvery{100};
+constexpr std::chrono::milliseconds kDropEvery{100};
 
 }  // namespace
 
 Result<void> ObjectTaker::start(RosDomain& domain, const IsNeighbour& is_own) {
   Topic topic = detections_topic(settings_.topic, settings_.type);
   if (settings_.type == MessageType::kTf) topic.read_depth = tf_topic().read_depth;
-  if (settings_.drop_after) worker_.repeat(kLookEvery, [this] { drop(); });
+  if (settings_.drop_after) worker_.repeat(kDropEvery, [this] { drop(); });
   return domain.subscribe(topic, [this, is_own](Message&& message, const Source& source) {
     if (source.bridge && is_own(*source.bridge)) return;
     worker_.post([this, taken = std::move(message), writer = source.guid] {
@@ -75,7 +75,7 @@ Result<void> ObjectTaker::observe(const DetectionImport::Sighting& one) {
   if (!under) return tl::unexpected(under.error());
   Query query;
   query.at = stamp;
-  const auto X_UC = node_.lookup(*under, camera, query, kPatience);
+  const auto X_UC = node_.lookup(*under, camera, query, kCameraPatience);
   if (!X_UC) return tl::unexpected(X_UC.error());
   const RosPose place = ros_pose_of(X_UC->pose * X_CO.pose);
   frames_.place({stamp.value_or(Time()), settings_.under, one.value.child, place});

@@ -12,7 +12,7 @@
 namespace tfdude::ros {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Clock = cli::Worker::Clock;
 
 constexpr std::chrono::milliseconds kPatience{100};
 

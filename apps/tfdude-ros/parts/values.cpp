@@ -12,7 +12,7 @@ namespace tfdude::ros {
 namespace {
 
 // How long a pose waits for the odometry of its instant.
-constexpr Milliseconds kPatience{1000};
+constexpr Milliseconds kValuePatience{1000};
 
 }  // namespace
 
@@ -82,7 +82,7 @@ Result<void> ValueTaker::determine(Result<Measurement> value, const std::string&
   }
   Query query;
   query.at = value->stamp;
-  const auto X_EB = node_.lookup(*edge, value->b, query, kPatience);
+  const auto X_EB = node_.lookup(*edge, value->b, query, kValuePatience);
   if (!X_EB) return tl::unexpected(X_EB.error());
   const auto stamp = value->stamp ? value->stamp : X_EB->stamp;
   if (!stamp) {

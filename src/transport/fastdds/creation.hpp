@@ -24,10 +24,10 @@ void fail_creations(FailCreation fails);
 /// Logs what does not happen because of that, the 1st, 2nd, 4th, 8th... time.
 void log_not_created(const char* consequence, const Error& error);
 
-/// Hold it while an endpoint is created or deleted, and never in a callback of Fast DDS. All endpoints
-/// of a topic in a process share a pool of memory. Who creates one looks whether the pool is there,
-/// and only then takes hold of it (2.9's TopicPayloadPoolRegistry); if the last endpoint is deleted
-/// between the two, Fast DDS follows a null pointer.
+/// Hold it while an endpoint is created or deleted, and never in a callback of Fast DDS. All
+/// endpoints of a topic in a process share a pool of memory. Who creates one looks whether the pool
+/// is there, and only then takes hold of it (2.9's TopicPayloadPoolRegistry). If the last endpoint
+/// is deleted between the two, Fast DDS follows a null pointer.
 [[nodiscard]] Mutex& endpoints_change();
 
 /// All entities are created through this. @return kTransport, with what could not be created
