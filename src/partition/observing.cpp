@@ -9,6 +9,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/stamp.hpp"
+#include "tree/sample_rows.hpp"
 
 namespace tfdude {
 namespace {
@@ -101,16 +102,17 @@ bool is_uncertain(const Belief& X) {
 // Whether a sample was left out of a later observation of the edges that it was observed with. Such
 // an observation merges the sources that it meets, so a static edge that still has the sample's
 // source has not taken part in one. Samples of other edges tell nothing: they may be left out, too.
-bool is_outdated(const ObservePlan& plan, const ObservedPath& path, std::size_t edge) {
+bool is_outdated(const ObservePlan& plan, const ObservedPath& path, std::size_t row) {
+  const std::size_t edge = path.rows[row].edge;
   const std::string& id = plan.edges[edge].info.id;
-  const auto& with = path.correlations[edge].observed_with;
+  const auto& with = path.correlations[row].observed_with;
   const auto is_sample = [&](std::size_t k) {
     const std::string& one = plan.edges[k].info.id;
     return is_moving(one, path.correlations[k]) && !is_drifting(one, path.correlations[k]);
   };
   if (!is_sample(edge)) return false;
   const auto is_over = [&](const CommonError& error) {
-    if (!is_observed(error)) return false;
+    if (!is_observed(error) || is_own_of_row(error)) return false;
     bool lacks = false;
     for (std::size_t k = 0; k < plan.edges.size(); ++k) {
       const std::string& other = plan.edges[k].info.id;
@@ -122,7 +124,7 @@ bool is_outdated(const ObservePlan& plan, const ObservedPath& path, std::size_t 
     }
     return lacks;
   };
-  const auto& errors = path.edges[edge].X_PC.common_errors;
+  const auto& errors = path.edges[row].X_PC.common_errors;
   return std::any_of(errors.begin(), errors.end(), is_over);
 }
 
@@ -361,7 +363,7 @@ void untie_outdated(const ObservePlan& plan, const ObservedPath& path,
     return on_path(edge) && is_uncertain(edge.X_PC);
   });
   bool alone = false;
-  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+  for (std::size_t k = 0; k < edges.size(); ++k) {
     Belief& X = edges[k].X_PC;
     if (X.unspecified || !is_outdated(plan, path, k)) continue;
     if (!on_path(edges[k])) {

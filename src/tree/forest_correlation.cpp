@@ -34,6 +34,16 @@ std::vector<const Revision*> samples_of(const std::vector<Revision>& edges, std:
   return all;
 }
 
+bool shares_observation(const Correlation& one, const Correlation& other) {
+  const auto has = [&](const std::string& source) {
+    return std::any_of(other.common_errors.begin(), other.common_errors.end(),
+                       [&](const CommonError& error) { return error.source == source; });
+  };
+  return std::any_of(
+      one.common_errors.begin(), one.common_errors.end(),
+      [&](const CommonError& error) { return is_observed(error) && has(error.source); });
+}
+
 }  // namespace
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
@@ -226,6 +236,24 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
   if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
 }
 
+// What an observation has made of the samples from one instant until another is an error of their
+// own. Later ones have a part of it in common with them that no source tells.
+void Forest::Impl::untie_samples(std::uint32_t slot, std::int64_t from, std::int64_t until) {
+  std::uint64_t number = frames_.newest_value(slot).samples->place_of(from);
+  for (;; ++number) {
+    const HeldVersion& edge = frames_.newest_value(slot);
+    if (number >= edge.samples->next() || edge.samples->stamp(number) >= until) return;
+    const Sample& sample = *edge.samples->sample(number);
+    if (!is_correlated(sample)) continue;
+    const std::int64_t at = sample.stamp;
+    const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+    const Transform X = tfdude::whole(sample, said);
+    const SampleRevision alone{given(sample), said != nullptr ? *said : Correlation(),
+                               sample.revision()->row};
+    replace_sample(edge, {X, nullptr, &alone}, at);
+  }
+}
+
 // Rows that the revisions leave out are over: what ties the others to them is lost.
 void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
                                   std::int64_t stamp) {
@@ -247,6 +275,10 @@ void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Re
     const auto& errors = one.correlation.common_errors;
     return !one.correlation.unknown && std::any_of(errors.begin(), errors.end(), is_observed);
   };
+  if (stamp_of(*revisions.front()) > until && last != nullptr &&
+      shares_observation(last->revision()->correlation(), revisions.front()->correlation)) {
+    untie_samples(slot, until, stamp_of(*revisions.front()));
+  }
   // The latest first: the samples after each row are carried on up to the next one.
   for (std::size_t i = revisions.size(); i-- > 0;) {
     const std::int64_t at = stamp_of(*revisions[i]);
@@ -291,8 +323,12 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
   const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
   const double seconds = std::abs(static_cast<double>(stamp - other.stamp)) * 1e-9;
   const Pose& G_PC = value.X_PC.pose;
-  const CorrelatedValue next =
+  CorrelatedValue next =
       drifted(other, said, G_PC, newest.samples->timing().process_noise, seconds);
+  // Partners that have got another value since are not linked any more.
+  if (newest.correlation != nullptr && newest.correlation->revised()) {
+    next.correlation.observed_with = newest.correlation->now().observed_with;
+  }
   RowInfo row;
   if (follows && other.revision() != nullptr) row.follows = other.revision()->row.follows;
   const SampleRevision revision{{G_PC, {}}, next.correlation, row};

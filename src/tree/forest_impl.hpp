@@ -196,6 +196,10 @@ class Forest::Impl {
   /// @param stamp  of those that have none
   void revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
                       std::int64_t stamp) TFDUDE_REQUIRES(mutex_);
+  /// Makes what observations have found of an edge's samples errors of their own.
+  /// @param until  not included
+  void untie_samples(std::uint32_t slot, std::int64_t from, std::int64_t until)
+      TFDUDE_REQUIRES(mutex_);
   /// Pushes the newest value again, with another correlation.
   void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,

@@ -234,6 +234,11 @@ SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
   return found;
 }
 
+void add(const std::vector<std::string>& ids, std::vector<std::string>& all) {
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(all),
+               [&](const std::string& id) { return std::count(all.begin(), all.end(), id) == 0; });
+}
+
 // The edges that the dynamic edge's value at that instant was observed with. Between two samples it
 // depends on both, unless the edge drifts.
 std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t t) {
@@ -245,9 +250,7 @@ std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t 
   std::vector<std::string> all;
   for (const Sample* sample : {found.before, found.after}) {
     if (sample == nullptr || !is_correlated(*sample)) continue;
-    for (const std::string& id : sample->revision()->correlation().observed_with) {
-      if (std::count(all.begin(), all.end(), id) == 0) all.push_back(id);
-    }
+    add(sample->revision()->correlation().observed_with, all);
   }
   return all;
 }
@@ -269,8 +272,9 @@ void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues
       with.assign(edge->samples->timing().drifts ? 3 : 2, std::string(edge->name->text));
       if (!found.stamp) continue;
       const std::int64_t t = nanoseconds(*found.stamp);
-      const auto last = tell_rows(*edge, i, t, rows, found);
-      const auto others = last ? *last : observed_with_at(*edge, t);
+      const auto told = tell_rows(*edge, i, t, rows, found);
+      auto others = told.value_or(std::vector<std::string>());
+      if (!told || !edge->samples->timing().drifts) add(observed_with_at(*edge, t), others);
       auto& all = found.correlations[i].observed_with;
       std::copy_if(others.begin(), others.end(), std::back_inserter(all),
                    [&](const std::string& id) { return id != edge->name->text; });

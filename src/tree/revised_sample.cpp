@@ -108,6 +108,11 @@ Transform given(const Sample& sample) {
   return revision != nullptr ? revision->given : sample.value();
 }
 
+Matrix6d share_of_after(const Sample& before, const Sample& after, double s) {
+  const Twist xi = log(before.value_pose().inverse() * after.value_pose());
+  return s * right_jacobian(s * xi) * right_jacobian(xi).inverse();
+}
+
 CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, double s,
                                      const Correlation* said) {
   const Belief X0 = belief_of(before, said);
@@ -116,9 +121,8 @@ CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, 
   interpolate(collapse(X0), collapse(X1), s, X);
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const Matrix6d B0 = right_jacobian((s - 1.0) * xi) * right_jacobian(-xi).inverse();
-  const Matrix6d B1 = right_jacobian(s * xi) * right_jacobian(xi).inverse();
   std::vector<CommonError> common_errors = times((1.0 - s) * B0, X0.common_errors);
-  add_errors(times(s * B1, X1.common_errors), common_errors);
+  add_errors(times(share_of_after(before, after, s), X1.common_errors), common_errors);
   return split(X, std::move(common_errors), X0.unknown || X1.unknown);
 }
 

@@ -61,6 +61,10 @@ struct CorrelatedValue {
 [[nodiscard]] CorrelatedValue interpolate_observed(const Sample& before, const Sample& after,
                                                    double s, const Correlation* said);
 
+/// By what the error of `after` counts there: the value's error is that much of it, and much of that
+/// of `before`.
+[[nodiscard]] Matrix6d share_of_after(const Sample& before, const Sample& after, double s);
+
 /// As extrapolate() of two samples. An observation does not change the twist, which is that of the
 /// samples as given: the correction is an offset, and stays. Common errors that are said of the
 /// edge may differ from sample to sample, as own parts may, and grow as those do.

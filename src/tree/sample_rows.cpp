@@ -21,6 +21,14 @@ const Correlation* said_of(const HeldVersion& edge) {
   return edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
 }
 
+// The edges that its newest value is still tied to; the rows list also those that have got another
+// value since.
+std::vector<std::string> partners_of(const HeldVersion& edge, const Sample& row) {
+  const EdgeCorrelation* newest = edge.correlation;
+  return newest != nullptr && newest->revised() ? newest->now().observed_with
+                                                : row.revision()->correlation().observed_with;
+}
+
 // Null: there is none with that stamp any more.
 const Sample* sample_at(const HeldVersion& edge, std::int64_t t) {
   if (t == edge.stamp) return edge.samples->sample(edge.number);
@@ -42,10 +50,12 @@ std::vector<const Sample*> rows_of(const HeldVersion& edge) {
   return rows;
 }
 
+// How many samples are looked through for one that was observed.
+constexpr std::uint64_t kMany = 256;
+
 // Whether so many samples follow that to correct them all would take long. Then the newest one is
 // the next that is observed.
 bool is_long_ago(const HeldVersion& edge, const Sample& row) {
-  constexpr std::uint64_t kMany = 256;
   const Sample* after = edge.number < kMany ? nullptr : edge.samples->sample(edge.number - kMany);
   return after != nullptr && after->stamp > row.stamp;
 }
@@ -107,6 +117,8 @@ RowOfSample as_stored(const Sample& sample, std::size_t segment, const Correlati
   return row;
 }
 
+std::string own_prefix() { return std::string(kObservedPrefix) + '@'; }
+
 // Its own part becomes an error that others may have in common with it. Its name is one that no
 // other sample, and no other value of this one, has anywhere.
 void share_own(const HeldVersion& edge, const Sample& sample, RowOfSample& row) {
@@ -114,8 +126,8 @@ void share_own(const HeldVersion& edge, const Sample& sample, RowOfSample& row) 
   if (root.cols() == 0) return;
   const auto text = [](auto number) { return std::to_string(number); };
   row.correlation.common_errors.push_back(
-      {std::string(kObservedPrefix) + "@" + text(std::hash<std::string_view>()(edge.name->text)) +
-           "." + text(sample.commit) + "." + text(sample.stamp),
+      {own_prefix() + text(std::hash<std::string_view>()(edge.name->text)) + "." +
+           text(sample.commit) + "." + text(sample.stamp),
        false, std::move(root)});
   row.X_PC.covariance = Covariance();
 }
@@ -179,6 +191,55 @@ void forget_correlation(std::size_t i, SegmentValues& found) {
   found.values[i].covariance.set_complete(complete);
 }
 
+// The last one that was observed, of an edge whose samples err independently. Null: none is tied to
+// other edges.
+const Sample* last_tied(const HeldVersion& edge) {
+  for (std::uint64_t back = 0; back <= std::min(edge.number, kMany); ++back) {
+    const Sample* sample = edge.samples->sample(edge.number - back);
+    if (sample == nullptr) break;
+    if (sample->revision() == nullptr || !sample->revision()->row.observed) continue;
+    const bool tied = is_correlated(*sample) && !sample->revision()->correlation().unknown;
+    return tied && sample->complete() ? sample : nullptr;
+  }
+  return nullptr;
+}
+
+// What the value between two samples has of the later one's own part becomes an error that both
+// have in common.
+void share_later(const HeldVersion& edge, std::int64_t t, const Sample& later, RowOfSample& row,
+                 SegmentValues& found) {
+  std::uint64_t back = 0;
+  const auto [before, after] = edge.samples->around(t, edge.number, back);
+  if (before == nullptr || after != &later || before->stamp == t) return;
+  if (row.X_PC.covariance.of_specified().matrix().isZero(0)) return;
+  const double s =
+      static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
+  const Matrix6d share = share_of_after(*before, *after, s);
+  StatedCovariance& own = found.values[row.segment].covariance;
+  const Matrix6d rest = own.of_specified().matrix() -
+                        share * row.X_PC.covariance.of_specified().matrix() * share.transpose();
+  const bool complete = own.complete();
+  own = Covariance::trusted(nearest_semidefinite(rest));
+  own.set_complete(complete);
+  share_own(edge, later, row);
+  auto& errors = found.correlations[row.segment].common_errors;
+  add_errors(times(share, {row.correlation.common_errors.back()}), errors);
+}
+
+// The samples of an edge that does not drift err independently, until an observation ties them to
+// others. Those that were observed after the instant are still looked up, so the last of them is
+// corrected, too.
+std::optional<std::vector<std::string>> tell_later_row(const HeldVersion& edge, std::size_t segment,
+                                                       std::int64_t t, SegmentValues& found) {
+  const Sample* later = last_tied(edge);
+  if (later == nullptr || later->stamp <= t) return std::nullopt;
+  RowOfSample row = as_stored(*later, segment, said_of(edge));
+  share_later(edge, t, *later, row, found);
+  std::vector<std::string> with = row.correlation.observed_with;
+  found.rows.push_back(std::move(row));
+  return with;
+}
+
 }  // namespace
 
 const Sample* last_observed(const HeldVersion& edge) {
@@ -187,6 +248,8 @@ const Sample* last_observed(const HeldVersion& edge) {
   const Sample* row = sample_at(edge, newest->revision()->row.follows);
   return row != nullptr && row->revision() != nullptr ? row : nullptr;
 }
+
+bool is_own_of_row(const CommonError& error) { return error.source.rfind(own_prefix(), 0) == 0; }
 
 std::size_t observed_since(const HeldVersion& edge, std::int64_t t) {
   std::size_t count = 0;
@@ -201,7 +264,10 @@ std::size_t observed_since(const HeldVersion& edge, std::int64_t t) {
 std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::size_t segment,
                                                   std::int64_t t, Rows asked,
                                                   SegmentValues& found) {
-  if (asked == Rows::kNone || !edge.samples->timing().drifts || t > edge.stamp) return std::nullopt;
+  if (asked == Rows::kNone || t > edge.stamp) return std::nullopt;
+  if (!edge.samples->timing().drifts) {
+    return asked == Rows::kOfPath ? tell_later_row(edge, segment, t, found) : std::nullopt;
+  }
   const std::vector<const Sample*> rows = rows_of(edge);
   if (rows.empty()) return std::nullopt;
   const Sample& last = *rows.front();
@@ -212,7 +278,7 @@ std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::
   const Correlation& correlation = last.revision()->correlation();
   if (correlation.unknown || !last.complete()) {
     if (asked == Rows::kOfPath && t < last.stamp) forget_correlation(segment, found);
-    return correlation.observed_with;
+    return partners_of(edge, last);
   }
   std::vector<RowOfSample> told;
   for (const Sample* row : rows) told.push_back(as_stored(*row, segment, said));
@@ -237,7 +303,7 @@ std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::
   }
   found.rows.insert(found.rows.end(), std::make_move_iterator(told.begin()),
                     std::make_move_iterator(told.end()));
-  return correlation.observed_with;
+  return partners_of(edge, last);
 }
 
 }  // namespace tfdude

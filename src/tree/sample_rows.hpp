@@ -10,8 +10,8 @@
 #include "tree/held_edge.hpp"
 #include "tree/segments.hpp"
 
-// An edge that drifts, observed at several instants in any order. Its errors at these instants are
-// rows of one joint covariance (delayed states): an observation at one of them corrects all.
+// A dynamic edge, observed at several instants in any order. Its errors at these instants are rows
+// of one joint covariance (delayed states): an observation at one of them corrects all.
 namespace tfdude {
 
 /// How many instants are kept as rows, at most. An observation costs that many more edges.
@@ -34,11 +34,15 @@ static_assert(lasting(kMostRows) == kRowLasts * kMostRows);
 /// At how many instants after this one, up to kMostRows, the edge was observed.
 [[nodiscard]] std::size_t observed_since(const HeldVersion& edge, std::int64_t t);
 
-/// Adds the rows of an edge that drifts to what was found of it at an instant, and makes the
-/// value there one that is correlated with them. Between two rows it is tied to both, as the walk
-/// in between is known (a Brownian bridge). Before the first row only that is known by how much the
-/// edge may have drifted until then, but not how this is correlated with what was seen since: it
-/// counts as of unknown correlation.
+/// Whether this is the own part of a row, that others have in common with it.
+[[nodiscard]] bool is_own_of_row(const CommonError& error);
+
+/// Adds the rows of a dynamic edge to what was found of it at an instant, and makes the value there
+/// one that is correlated with them. If the edge drifts, the value between two rows is tied to both,
+/// as the walk in between is known (a Brownian bridge). Before the first row only that is known by
+/// how much the edge may have drifted until then, but not how this is correlated with what was seen
+/// since: it counts as of unknown correlation. If it does not drift, its samples err independently;
+/// then only the last one that was observed is a row, and only for earlier instants on the path.
 /// @param segment  of `found`, whose value at the instant was looked up
 /// @return the edges that it was observed with; empty: the value stays, and there are no rows
 [[nodiscard]] std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge,
