@@ -52,16 +52,17 @@ struct Silence {
 /// A server that is needed and was not heard for this long is asked for a sign of life.
 inline constexpr std::chrono::milliseconds kProbeAfter{100};
 
-/// Judges a server that did not count as lost before. The silence of one that is needed begins when
-/// it is needed: earlier, nobody asked it. One that has not replied yet is asked even if it is
+/// Judges a server that did not count as lost before. One that is needed is asked, so it is lost
+/// earlier; this silence begins when it is needed. One that has not replied yet is asked even if it is
 /// heard: acknowledgements of a stream do not show that it receives requests.
 [[nodiscard]] inline Silence judge(const Hearing& heard, const Patience& patience,
                                    Hearing::Time now) {
   const bool needed = heard.needed_since.has_value();
   const auto quiet = now - std::max(heard.last, heard.needed_since.value_or(heard.last));
-  const auto unnoticed = heard.present ? patience.others : patience.first;
-  if (quiet >= (needed && heard.replied ? patience.needed : unnoticed)) {
-    const auto early = patience.others + patience.look_every - (now - heard.last);
+  const auto silent = now - heard.last;
+  const bool gave_no_answer = needed && heard.replied && quiet >= patience.needed;
+  if (gave_no_answer || silent >= (heard.present ? patience.others : patience.first)) {
+    const auto early = patience.others + patience.look_every - silent;
     return {Silence::Kind::kLost, std::max<std::chrono::nanoseconds>(early, {})};
   }
   const auto unasked = now - std::max(heard.asked, heard.needed_since.value_or(now));

@@ -68,6 +68,15 @@ TEST_CASE("silence: a server that is only streamed to is asked although it ackno
   CHECK(kind_after(hearing, milliseconds(750)) == Kind::kLost);
 }
 
+TEST_CASE("silence: who begins to need a server does not begin to wait for it anew") {
+  Hearing hearing = heard(false);
+  hearing.need(true, kStart + milliseconds(1900));
+  CHECK(kind_after(hearing, milliseconds(1999)) == Kind::kNone);
+  CHECK(kind_after(hearing, milliseconds(2000)) == Kind::kLost);
+  hearing.replied = true;
+  CHECK(kind_after(hearing, milliseconds(2000)) == Kind::kLost);
+}
+
 TEST_CASE("silence: a server without a presence gets more time") {
   Hearing hearing = heard(false);
   hearing.present = false;
