@@ -9,6 +9,7 @@
 
 #include "manual.hpp"
 #include "numbers.hpp"
+#include "standard_descriptors.hpp"
 #include "usage.hpp"
 
 namespace tfdude::cli {
@@ -21,6 +22,7 @@ namespace tfdude::cli {
 [[nodiscard]] inline std::optional<int> read_command_line(
     CLI::App& app, int argc, char** argv, std::vector<ManualSection> sections = {},
     const std::function<void()>& check = [] {}) {
+  hold_standard_descriptors();
   require_numbers(app);
   add_manual(app, std::move(sections));
   try {

@@ -15,6 +15,7 @@
 #include "../network_options.hpp"
 #include "../numbers.hpp"
 #include "../rendering/terminal.hpp"
+#include "../standard_descriptors.hpp"
 #include "../standard_output.hpp"
 #include "../stop_signals.hpp"
 #include "../usage.hpp"
@@ -43,6 +44,7 @@ void add_common_options(CLI::App& app, Common& common) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  cli::hold_standard_descriptors();
   Common common;
   common.argv = argv;
   CLI::App app{"tfdude: where is frame B seen from frame A, and how sure are we?"};

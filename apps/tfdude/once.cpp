@@ -22,6 +22,7 @@
 #include "../rendering/json.hpp"
 #include "../rendering/terminal.hpp"
 #include "../rendering/text.hpp"
+#include "../standard_descriptors.hpp"
 #include "../standard_output.hpp"
 #include "path_printing.hpp"
 #include "typed_stamp.hpp"
@@ -125,6 +126,7 @@ int become_whole_program(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  cli::hold_standard_descriptors();
   cli::terminal() = cli::terminal_of(STDOUT_FILENO);
   if (const auto status = answer_here(argc, argv)) return *status;
   return become_whole_program(argv);

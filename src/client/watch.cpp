@@ -26,18 +26,19 @@ bool PathWatch::wait_for_more(std::uint64_t messages,
 
 Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
   const Deadline deadline(wait);
-  auto newest = latest();
-  const std::uint64_t messages = this->messages();
-  if (returned_ || !newest) {
-    if (!path_->wait_for_more(returned_.value_or(messages), deadline.at())) {
-      if (!newest) return newest;
-      return fail(Errc::kTimeout,
-                  "nothing new of the " + path_->described() + " within " + deadline.text());
+  for (bool more = returned_.has_value();; more = true) {
+    const std::uint64_t messages = this->messages();
+    auto newest = latest();
+    if (newest && !(returned_ && is_same_value(*returned_, *newest))) {
+      returned_ = *newest;
+      return newest;
     }
-    newest = latest();
+    if (!newest && more) return newest;
+    if (path_->wait_for_more(messages, deadline.at())) continue;
+    if (!newest) return newest;
+    return fail(Errc::kTimeout,
+                "nothing new of the " + path_->described() + " within " + deadline.text());
   }
-  if (newest) returned_ = this->messages();
-  return newest;
 }
 
 Subscription PathWatch::on_value(

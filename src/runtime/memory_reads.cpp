@@ -230,8 +230,10 @@ void MemoryReads::drop_kept() {
       one = memories_.erase(one);
       continue;
     }
+    // One that was silent and has returned is attached again only when somebody reads it.
     const auto known = owners_.find(owner);
-    const bool there = known != owners_.end() && known->second.state == Known::State::kAttached;
+    const bool there = structure_.directory.reachable(owner) ||
+                       (known != owners_.end() && known->second.state == Known::State::kAttached);
     std::optional<Clock::time_point>& lost = one->second.lost;
     if (there) {
       lost.reset();

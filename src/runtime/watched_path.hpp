@@ -25,6 +25,14 @@ namespace tfdude {
 
 class MemoryReads;
 
+/// Whether a lookup has found again what another one had found.
+[[nodiscard]] inline bool is_same_value(const StampedTransform& one,
+                                        const StampedTransform& other) {
+  return one.stamp == other.stamp && one.covariance == other.covariance &&
+         one.pose.translation() == other.pose.translation() &&
+         one.pose.rotation().coeffs() == other.pose.rotation().coeffs();
+}
+
 /// One watched path, or several edges that are watched together. If the memory of all owners of the
 /// path can be read, it is read there. Otherwise it shows the mirror of one route,
 /// which readers find by one load. If the path takes another route, that has its own mirror, which

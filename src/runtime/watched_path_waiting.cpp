@@ -23,8 +23,8 @@ struct WatchedPath::Values {
   std::shared_ptr<Callbacks::Line> line;
   std::atomic<bool> due{false};
   // The following belong to the calls.
-  std::optional<std::uint64_t> messages{};  // that had come with the value of the last call
-  bool failed = false;                      // it had none
+  std::optional<StampedTransform> told{};
+  bool failed = false;  // the last call had none
 
   static void post(const std::shared_ptr<Values>& values) {
     if (values->due.exchange(true)) return;
@@ -34,10 +34,9 @@ struct WatchedPath::Values {
     due = false;
     const auto watched = path.lock();
     if (!watched) return;
-    const std::uint64_t now = watched->messages();
     const auto X = watched->lookup({});
-    if (X ? messages == now && !failed : failed) return;
-    if (X) messages = now;
+    if (X ? told && !failed && is_same_value(*told, *X) : failed) return;
+    if (X) told = *X;
     failed = !X;
     callback(X);
   }

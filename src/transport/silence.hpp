@@ -53,8 +53,8 @@ struct Silence {
 inline constexpr std::chrono::milliseconds kProbeAfter{100};
 
 /// Judges a server that did not count as lost before. One that is needed is asked, so it is lost
-/// earlier; this silence begins when it is needed. One that has not replied yet is asked even if it is
-/// heard: acknowledgements of a stream do not show that it receives requests.
+/// earlier; this silence begins when it is needed. One that has not replied yet is asked even if it
+/// is heard: acknowledgements of a stream do not show that it receives requests.
 [[nodiscard]] inline Silence judge(const Hearing& heard, const Patience& patience,
                                    Hearing::Time now) {
   const bool needed = heard.needed_since.has_value();

@@ -61,8 +61,8 @@ struct CorrelatedValue {
 [[nodiscard]] CorrelatedValue interpolate_observed(const Sample& before, const Sample& after,
                                                    double s, const Correlation* said);
 
-/// By what the error of `after` counts there: the value's error is that much of it, and much of that
-/// of `before`.
+/// By what the error of `after` counts there: the value's error is that much of it, and much of
+/// that of `before`.
 [[nodiscard]] Matrix6d share_of_after(const Sample& before, const Sample& after, double s);
 
 /// As extrapolate() of two samples. An observation does not change the twist, which is that of the

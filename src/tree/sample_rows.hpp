@@ -38,11 +38,12 @@ static_assert(lasting(kMostRows) == kRowLasts * kMostRows);
 [[nodiscard]] bool is_own_of_row(const CommonError& error);
 
 /// Adds the rows of a dynamic edge to what was found of it at an instant, and makes the value there
-/// one that is correlated with them. If the edge drifts, the value between two rows is tied to both,
-/// as the walk in between is known (a Brownian bridge). Before the first row only that is known by
-/// how much the edge may have drifted until then, but not how this is correlated with what was seen
-/// since: it counts as of unknown correlation. If it does not drift, its samples err independently;
-/// then only the last one that was observed is a row, and only for earlier instants on the path.
+/// one that is correlated with them. If the edge drifts, the value between two rows is tied to
+/// both, as the walk in between is known (a Brownian bridge). Before the first row only that is
+/// known by how much the edge may have drifted until then, but not how this is correlated with what
+/// was seen since: it counts as of unknown correlation. If it does not drift, its samples err
+/// independently; then only the last one that was observed is a row, and only for earlier instants
+/// on the path.
 /// @param segment  of `found`, whose value at the instant was looked up
 /// @return the edges that it was observed with; empty: the value stays, and there are no rows
 [[nodiscard]] std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge,

@@ -336,8 +336,8 @@ TEST_CASE("late observations: what a dynamic edge was observed with stays with i
   }
 }
 
-// The object is where the head was then, so one error of three that are equal. The late sighting ties
-// the tool to the object and to the head of before: of them only the object is on the path.
+// The object is where the head was then, so one error of three that are equal. The late sighting
+// ties the tool to the object and to the head of before: of them only the object is on the path.
 TEST_CASE("late observation: the newest sample stays tied to what a late sighting corrects") {
   LoopbackNetwork network;
   FrameSpec head{"head", "base", {}};
@@ -357,8 +357,8 @@ TEST_CASE("late observation: the newest sample stays tied to what a late sightin
   CHECK(X->covariance.of_specified().upper()[0] / 1e-6 == Approx(1.4).epsilon(1e-6));
 }
 
-// A partner with another owner has got a new value, so the sources of earlier observations stay. The
-// earlier sample, which has them too, is not corrected with the later one.
+// A partner with another owner has got a new value, so the sources of earlier observations stay.
+// The earlier sample, which has them too, is not corrected with the later one.
 TEST_CASE("late observation: the past of an edge that drifts never counts as known exactly") {
   LoopbackNetwork network;
   FrameSpec head{"head", "base", {}};

@@ -143,6 +143,40 @@ TEST_CASE("waiting: wait_next() returns each new value once, and the newest of s
   CHECK(watch->wait_next(1ms).error().code == watch->latest().error().code);
 }
 
+TEST_CASE("waiting: messages that leave the value as it is bring nothing new") {
+  const testing::Join join = testing::join_loopback();
+  FrameSpec base{"base", "world", ahead(0)};
+  base.timing = EdgeTiming();
+  FrameSpec arm{"arm", "base", ahead(0)};
+  arm.timing = EdgeTiming();
+  Node below = Node::open(join("base"), "base", {{"world", "", {}}, base}).value();
+  Node above = Node::open(join("arm"), "arm", {arm}).value();
+  Client client = Client::open(join("")).value();
+  for (int i = 0; i < 2; ++i) {
+    REQUIRE(below.update("base", ahead(i), instant(10 * i)));
+    REQUIRE(above.update("arm", ahead(0), instant(10 * i)));
+  }
+  auto watch = client.watch("world", "arm");
+  REQUIRE(watch);
+  REQUIRE(eventually([&] { return watch->latest() && watch->latest()->stamp == instant(10); }));
+  std::atomic<int> calls{0};
+  const Subscription values = watch->on_value([&](const Result<StampedTransform>&) { ++calls; });
+  REQUIRE(watch->wait_next(20s));
+  REQUIRE(eventually([&] { return calls == 1; }));
+  // The arm has no later sample, so the path stays at the instant of its last one.
+  const std::uint64_t before = watch->messages();
+  for (int i = 2; i < 6; ++i) REQUIRE(below.update("base", ahead(i), instant(10 * i)));
+  REQUIRE(eventually([&] { return watch->messages() > before; }));
+  const auto nothing = watch->wait_next(5ms);
+  REQUIRE_FALSE(nothing);
+  CHECK(nothing.error().code == Errc::kTimeout);
+  REQUIRE(above.update("arm", ahead(1), instant(20)));
+  const auto next = watch->wait_next(20s);
+  REQUIRE(next);
+  CHECK(next->stamp == instant(20));
+  REQUIRE(eventually([&] { return calls == 2; }));
+}
+
 TEST_CASE("waiting: on_value() calls with the newest value, and with the reason at its end") {
   World world;
   REQUIRE(world.node.update("base", ahead(1), instant(0)));

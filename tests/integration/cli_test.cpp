@@ -242,6 +242,19 @@ TEST_CASE("cli: every command has help with an example") {
   }
 }
 
+TEST_CASE("cli: nothing is written into what takes the place of a closed standard output") {
+  const ThesisDaemons d;
+  for (const std::string command : {"tree", "lookup world camera"}) {
+    CAPTURE(command);
+    testing::Process process({"/bin/sh", "-c", "exec \"$0\" \"$@\" " + command + " >&-", TFDUDE_CLI,
+                              "--domain", std::to_string(d.domain.number()), "--profile",
+                              TFDUDE_LOOPBACK_PROFILE});
+    const CliResult result = testing::finish(process);
+    CHECK(result.status == 1);
+    CHECK_THAT(result.err, ContainsSubstring("standard output: Bad file descriptor"));
+  }
+}
+
 TEST_CASE("cli: an answer that cannot be written is an error") {
   const ThesisDaemons d;
   const auto into_full_disk = [&](std::vector<std::string> arguments) {

@@ -52,16 +52,18 @@ class TFDUDE_EXPORT PathWatch {
                                    std::chrono::steady_clock::time_point deadline) const;
 
   /// Waits for a value that this object has not returned yet: the first time for the newest one,
-  /// and then for the next one after that. Values that come between two calls are not queued; the
-  /// newest is returned. One thread at a time; each copy of this object has its own place.
+  /// and then for one of which the pose, the covariance or the stamp differs. Values that come
+  /// between two calls are not queued; the newest is returned. So nothing is new while an owner of
+  /// the path is gone: health() says which. One thread at a time; each copy of this object has its
+  /// own place.
   /// @return as latest(); kTimeout: nothing new within `wait`
   [[nodiscard]] Result<StampedTransform> wait_next(Milliseconds wait);
 
   /// Calls a function with the newest value, if there is one, and then when there is another one,
-  /// or with the reason when there is none any more. On a library thread that holds no lock: it may
-  /// call any function and take any time; meanwhile values are not queued, and the newest comes
-  /// next. Must not throw. Ends with the Subscription, the last PathWatch of the path, or the
-  /// client.
+  /// as for wait_next(), or with the reason when there is none any more. On a library thread that
+  /// holds no lock: it may call any function and take any time; meanwhile values are not queued,
+  /// and the newest comes next. Must not throw. Ends with the Subscription, the last PathWatch of
+  /// the path, or the client.
   [[nodiscard]] Subscription on_value(
       std::function<void(const Result<StampedTransform>&)> callback) const;
 
@@ -74,7 +76,7 @@ class TFDUDE_EXPORT PathWatch {
 
  private:
   std::shared_ptr<WatchedPath> path_;
-  std::optional<std::uint64_t> returned_;  // wait_next() has returned what so many messages brought
+  std::optional<StampedTransform> returned_;  // by wait_next()
 };
 
 /// Edges whose owners push their changes, so that they are read from this process's memory: many
