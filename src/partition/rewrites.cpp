@@ -14,13 +14,13 @@ Result<std::optional<std::vector<EdgeSample>>> Rewrites::add(const PeerId& from,
                                     " samples to rewrite, of at most " +
                                     std::to_string(kMaxRewritten) + " at once");
   }
-  const auto key = std::make_pair(from, part.number);
+  const Key key(from, part.number);
+  const bool is_last = part.first + part.samples.size() == part.total;
   auto known = begun_.find(key);
-  if (known == begun_.end() && begun_.size() >= kMost) {
-    return fail(Errc::kTooMuch, "frame " + quote(id) + ": " + std::to_string(kMost) +
-                                    " others are being rewritten, the limit");
-  }
   if (known == begun_.end()) {
+    // Nothing is kept beyond the last part.
+    auto room = is_last ? Result<void>() : make_room(from, id);
+    if (!room) return tl::unexpected(std::move(room.error()));
     known = begun_.emplace(key, Begun{id, part.interval, part.total, now, {}, {}, 0}).first;
   }
   Begun& begun = known->second;
@@ -31,7 +31,6 @@ Result<std::optional<std::vector<EdgeSample>>> Rewrites::add(const PeerId& from,
   }
   begun.heard = now;
   put(begun, part);
-  const bool is_last = part.first + part.samples.size() == part.total;
   const bool is_whole = begun.samples.size() == begun.total;
   if (!is_whole && !is_last) return std::nullopt;
   std::vector<EdgeSample> all = std::move(begun.samples);
@@ -40,6 +39,31 @@ Result<std::optional<std::vector<EdgeSample>>> Rewrites::add(const PeerId& from,
   return fail(
       Errc::kChangedMeanwhile,
       "frame " + quote(id) + ": its owner does not have all parts of its rewrite (any more)");
+}
+
+std::size_t Rewrites::count(const PeerId& from) const {
+  return static_cast<std::size_t>(std::count_if(
+      begun_.begin(), begun_.end(), [&](const auto& one) { return one.first.first == from; }));
+}
+
+Result<void> Rewrites::make_room(const PeerId& from, const std::string& id) {
+  if (count(from) >= kMostOfOne) {
+    return fail(Errc::kTooMuch, "frame " + quote(id) + ": this participant has begun " +
+                                    std::to_string(kMostOfOne) +
+                                    " other rewrites here, its share of the limit");
+  }
+  if (begun_.size() < kMost) return {};
+  auto least = begun_.end();
+  for (auto one = begun_.begin(); one != begun_.end(); ++one) {
+    const bool more = count(one->first.first) > 1;
+    if (more && (least == begun_.end() || one->second.heard < least->second.heard)) least = one;
+  }
+  if (count(from) > 0 || least == begun_.end()) {
+    return fail(Errc::kTooMuch, "frame " + quote(id) + ": " + std::to_string(kMost) +
+                                    " others are being rewritten, the limit");
+  }
+  begun_.erase(least);
+  return {};
 }
 
 // Also that no more is kept than there may be in all.

@@ -18,10 +18,12 @@ namespace tfdude {
 
 /// An owner's rewrites of the past of which not all parts have come. Not thread-safe.
 /// @par Memory  Limited: kMost of them, of at most kMaxRewritten samples each, and only what has
-///   come.
+///   come. A sender has at most kMostOfOne. If there is no room for one that has none, the rewrite
+///   that was heard of least recently, of a sender with several, makes room.
 class Rewrites {
  public:
   static constexpr std::size_t kMost = 4;
+  static constexpr std::size_t kMostOfOne = 2;
   /// One of which nothing has come for so long is dropped. Its sender repeats a part that is lost
   /// much sooner.
   static constexpr std::chrono::seconds kIdle{10};
@@ -48,11 +50,15 @@ class Rewrites {
     std::size_t ahead = 0;                                     // how many these are
   };
 
+  using Key = std::pair<PeerId, std::uint64_t>;  // the sender and its number
+
+  [[nodiscard]] std::size_t count(const PeerId& from) const;
+  [[nodiscard]] Result<void> make_room(const PeerId& from, const std::string& id);
   [[nodiscard]] static bool fits(const Begun& begun, const std::string& id,
                                  const RewriteRequest& part);
   static void put(Begun& begun, const RewriteRequest& part);
 
-  std::map<std::pair<PeerId, std::uint64_t>, Begun> begun_;
+  std::map<Key, Begun> begun_;
 };
 
 }  // namespace tfdude

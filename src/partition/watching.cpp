@@ -52,6 +52,14 @@ std::vector<PushedValue> entries_of(const SegmentValues& found) {
   return entries;
 }
 
+std::size_t size_of(const std::vector<PushedValue>& entries) {
+  std::size_t size = entries.size();
+  for (const PushedValue& entry : entries) {
+    size += entry.correlation.common_errors.size() + entry.correlation.observed_with.size();
+  }
+  return size;
+}
+
 }  // namespace
 
 std::size_t correlated_entries(const PushedValues& pushed) {
@@ -331,21 +339,32 @@ std::vector<PushedValues> pieces_of(PushedValues&& pushed) {
 std::optional<PushedValues> PushedPieces::add(const PushedValues& piece) {
   // A reply may come between pushed pieces.
   if (piece.pieces <= 1) return piece;
+  const bool goes_on =
+      next_ == piece.piece && piece.commit == whole_.commit && piece.pieces == whole_.pieces;
+  if (piece.piece == 0 || !goes_on) drop();
+  if (piece.piece != 0 && !goes_on) return std::nullopt;
+  size_ += size_of(piece.entries);
+  if (size_ > kMost) {
+    drop();
+    return std::nullopt;
+  }
   if (piece.piece == 0) {
     whole_ = piece;
-    next_ = 0;
-  } else if (next_ != piece.piece || piece.commit != whole_.commit ||
-             piece.pieces != whole_.pieces) {
-    next_ = 0;
-    return std::nullopt;
   } else {
     whole_.entries.insert(whole_.entries.end(), piece.entries.begin(), piece.entries.end());
   }
   if (++next_ < piece.pieces) return std::nullopt;
+  PushedValues whole = std::move(whole_);
+  drop();
+  whole.piece = 0;
+  whole.pieces = 1;
+  return whole;
+}
+
+void PushedPieces::drop() {
+  whole_ = {};
   next_ = 0;
-  whole_.piece = 0;
-  whole_.pieces = 1;
-  return std::move(whole_);
+  size_ = 0;
 }
 
 ReceivedGroup::Place ReceivedGroup::place(PushedValues& whole) {

@@ -114,14 +114,22 @@ class WatchedGroup {
 [[nodiscard]] std::vector<PushedValues> pieces_of(PushedValues&& pushed);
 
 /// Reassembles pieces, which come in order or not at all.
+/// @par Memory  Limited by kMost. Values beyond it are as good as lost: the watcher asks for all.
 class PushedPieces {
  public:
+  /// Values of one push, with the common errors that are said of them: four edges that were each
+  /// rewritten as far as one rewrite goes.
+  static constexpr std::size_t kMost = 4 * std::size_t{kMaxRewritten};
+
   /// @return all values, once the last piece has come
   [[nodiscard]] std::optional<PushedValues> add(const PushedValues& piece);
 
  private:
+  void drop();
+
   PushedValues whole_;
   std::uint32_t next_ = 0;
+  std::size_t size_ = 0;  // counted as kMost
 };
 
 /// A watcher's side of one group: puts together what comes of it, and notices what was lost.

@@ -83,12 +83,12 @@ TEST_CASE("what an owner keeps of unfinished rewrites is limited, in number, siz
   RewriteRequest large = parts_of(1, 1)[0];
   large.total = kMaxRewritten + 1;
   CHECK(outcome(rewrites.add(kPeer, "odom", large, kNow)) == "too_much");
-  for (std::uint64_t i = 0; i < Rewrites::kMost; ++i) {
-    CHECK(rewrites.add(kPeer, "odom", parts_of(2, 1, i)[0], kNow));
+  for (std::uint8_t i = 0; i < Rewrites::kMost; ++i) {
+    CHECK(rewrites.add(i == 0 ? kPeer : PeerId{2, i}, "odom", parts_of(2, 1)[0], kNow));
   }
   const RewriteRequest more = parts_of(2, 1, 77)[0];
   CHECK(outcome(rewrites.add(kPeer, "odom", more, kNow)) == "too_much");
-  CHECK(is_whole(**rewrites.add(kPeer, "odom", parts_of(2, 1, 0)[1], kNow), 2));
+  CHECK(is_whole(**rewrites.add(kPeer, "odom", parts_of(2, 1)[1], kNow), 2));
   CHECK(rewrites.add(kPeer, "odom", more, kNow));
   CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[0], kNow)) == "too_much");
   rewrites.forget_idle(kNow + 1s);
@@ -99,6 +99,37 @@ TEST_CASE("what an owner keeps of unfinished rewrites is limited, in number, siz
   // A sender of all parts must not believe that it is done.
   CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 78)[1], kNow)) == "changed_meanwhile");
   CHECK(outcome(rewrites.add(kPeer, "odom", parts_of(2, 1, 77)[1], kNow)) == "changed_meanwhile");
+}
+
+TEST_CASE("one sender's rewrites leave room for those of others") {
+  Rewrites rewrites;
+  const auto begin = [&](std::uint8_t peer, std::uint64_t number, Time now = kNow) {
+    return rewrites.add(PeerId{peer}, "odom", parts_of(2, 1, number)[0], now);
+  };
+  const auto end = [&](std::uint8_t peer, std::uint64_t number) {
+    return outcome(rewrites.add(PeerId{peer}, "odom", parts_of(2, 1, number)[1], kNow));
+  };
+  CHECK(begin(1, 1, kNow + 1s));
+  CHECK(begin(1, 2));
+  const auto third = begin(1, 3);
+  REQUIRE(outcome(third) == "too_much");
+  CHECK(third.error().message ==
+        "frame 'odom': this participant has begun 2 other rewrites here, its share of the limit");
+  CHECK(begin(1, 2));  // again
+  CHECK(begin(2, 1, kNow + 2s));
+  CHECK(begin(2, 2, kNow + 3s));
+  // The least recent of who has two makes room.
+  CHECK(begin(3, 1));
+  CHECK(end(1, 2) == "changed_meanwhile");
+  CHECK(begin(4, 1));
+  CHECK(end(2, 1) == "changed_meanwhile");
+  // Now each has one, and none of these makes room.
+  CHECK(outcome(begin(5, 1)) == "too_much");
+  CHECK(outcome(begin(4, 2)) == "too_much");
+  CHECK(end(1, 1) == "ok");
+  CHECK(end(2, 2) == "ok");
+  CHECK(end(3, 1) == "ok");
+  CHECK(end(4, 1) == "ok");
 }
 
 TEST_CASE("a part that does not fit the others ends its rewrite") {

@@ -179,6 +179,25 @@ TEST_CASE("a push in several messages is reassembled when all have arrived") {
   CHECK(pieces_of({7, {}, 0, 5}).size() == 1);
 }
 
+TEST_CASE("what is kept of a push in several messages is limited, with its common errors") {
+  const bool correlated = GENERATE(false, true);
+  PushedValues piece{7, {}, 3, 5, 0, UINT32_MAX};
+  const std::size_t each = correlated ? kMaxCorrelated : kMaxItems;
+  PushedValue value{0, ms(1), along_x(1), {}, 1, {}};
+  if (correlated) value.correlation.common_errors.resize(kMaxCommonErrors);
+  piece.entries.assign(each, value);
+  const std::size_t most = PushedPieces::kMost / each / (correlated ? kMaxCommonErrors + 1 : 1);
+  const auto ends = [&](std::size_t count) {
+    PushedPieces together;
+    PushedValues one = piece;
+    one.pieces = static_cast<std::uint32_t>(count);
+    for (one.piece = 0; one.piece + 1 < count; ++one.piece) CHECK_FALSE(together.add(one));
+    return together.add(one).has_value();
+  };
+  CHECK(ends(most));
+  CHECK_FALSE(ends(most + 1));
+}
+
 TEST_CASE("a watch without edges or with a period beyond the maximum is rejected") {
   CHECK(check_watch({{kArm}, false, false, kMaxWatchPeriod}));
   CHECK(check_watch({{kArm}}));
