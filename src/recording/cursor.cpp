@@ -80,7 +80,7 @@ bool Cursor::has(const ChunkPlace& chunk, Topic topic) const {
 void Cursor::begin_at(std::size_t chunk) {
   first_chunk_ = chunk_ = chunk;
   waiting_.clear();
-  decoder_ = {};
+  decoder_ = ValuesDecoder(*edges_);
   counts_ = {};
   transforms_ = {};
   behind_.reset();
@@ -164,7 +164,7 @@ void Cursor::date_transforms() {
     const bool other_clock = std::chrono::abs(behind) > kOtherClock;
     value.value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
     ++counts_.unstamped;
-    note("frame " + quote(value.edge.id) +
+    note("frame " + quote(value.edge->id) +
          ": its messages have no stamp (0): taken as of the time when they were logged");
     return true;
   });
@@ -202,7 +202,7 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
 }
 
 Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
-  auto transforms = decode_tf(message.data);
+  auto transforms = decode_tf(message.data, *edges_);
   if (!transforms) {
     ++counts_.messages;
     return tl::unexpected(std::move(transforms.error()));

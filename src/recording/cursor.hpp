@@ -16,7 +16,7 @@
 
 namespace tfdude::recording {
 
-/// A message of a recording, ours or that of ROS.
+/// A message of a recording, ours or that of ROS. The edges of its values are those of its cursor.
 struct RecordedMessage {
   Time log;
   std::variant<RecordedFrames, RecordedValues, RecordedJoints, Change> what;
@@ -88,7 +88,8 @@ class Cursor {
   std::optional<Time> statics_before_;
   std::size_t chunk_ = 0;  // the next one
   std::deque<RecordedMessage> waiting_;
-  ValuesDecoder decoder_;
+  std::unique_ptr<EdgeTable> edges_ = std::make_unique<EdgeTable>();
+  ValuesDecoder decoder_{*edges_};
 };
 
 }  // namespace tfdude::recording

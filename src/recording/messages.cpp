@@ -41,17 +41,16 @@ void put_upper(CdrWriter& writer, const Covariance& covariance) {
   writer.f64s(covariance.upper());
 }
 
-// Nothing if there are no numbers; otherwise they must be 21.
-std::optional<Covariance::Upper> upper_of(CdrReader& reader, bool& valid) {
+// Whether there are numbers; then they must be 21.
+bool read_upper(CdrReader& reader, Covariance::Upper& upper, bool& valid) {
   const std::uint32_t count = reader.count(sizeof(double));
-  if (count == 0) return std::nullopt;
-  Covariance::Upper upper{};
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double number = reader.f64();
-    if (i < upper.size()) upper[i] = number;
+  if (count == upper.size()) {
+    reader.f64s(upper);
+    return true;
   }
-  valid = valid && count == upper.size();
-  return upper;
+  valid = valid && count == 0;
+  for (std::uint32_t i = 0; i < count; ++i) (void)reader.f64();
+  return false;
 }
 
 void put(CdrWriter& writer, const Correlation& correlation) {
@@ -67,8 +66,7 @@ void put(CdrWriter& writer, const Correlation& correlation) {
   for (const std::string& edge : correlation.observed_with) writer.text(edge);
 }
 
-Correlation correlation_of(CdrReader& reader, bool& valid) {
-  Correlation correlation;
+void read_correlation(CdrReader& reader, Correlation& correlation, bool& valid) {
   correlation.unknown = reader.flag();
   const std::uint32_t errors = reader.count(12);
   for (std::uint32_t i = 0; i < errors && reader.good(); ++i) {
@@ -90,12 +88,11 @@ Correlation correlation_of(CdrReader& reader, bool& valid) {
     correlation.observed_with.emplace_back(reader.text());
     valid = valid && check_id(correlation.observed_with.back(), "id");
   }
-  valid = valid && check_common_errors(correlation.common_errors);
-  return correlation;
+  valid = valid && (errors == 0 || check_common_errors(correlation.common_errors));
 }
 
-bool is_edge(const WatchedFrame& edge) {
-  return check_id(edge.id, "id") && check_id(edge.parent, "parent") && edge.id != edge.parent;
+bool is_edge(std::string_view id, std::string_view parent) {
+  return check_id(id, "id") && check_id(parent, "parent") && id != parent;
 }
 
 }  // namespace
@@ -148,46 +145,61 @@ void ValuesEncoder::put_kept() {
   }
 }
 
-std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
-  RecordedValue recorded;
-  recorded.edge.id = reader.text();
-  recorded.edge.parent = reader.text();
+const RecordedEdge* ValuesDecoder::decode_edge(CdrReader& reader) {
+  const std::string_view id = reader.text();
+  const std::string_view parent = reader.text();
+  const RecordedEdge* edge = edges_->find(id, parent);
+  if (edge != nullptr || !is_edge(id, parent)) return edge;
+  return edges_->add(id, parent);
+}
+
+std::optional<Covariance::Upper>& ValuesDecoder::last_of(const RecordedEdge& edge) {
+  if (last_.size() <= edge.frame) last_.resize(edge.frame + std::size_t{1});
+  return last_[edge.frame];
+}
+
+bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& recorded) {
+  WatchedValue& value = recorded.value;
+  recorded.edge = decode_edge(reader);
   const std::int64_t stamp = reader.i64();
   const auto is = static_cast<CovarianceIs>(reader.u8());
   const auto begins = static_cast<Begins>(reader.u8());
-  Flat flat{};
-  for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
-  bool valid = is_edge(recorded.edge) && stamp >= kUnsampled && stamp <= kMaxTime;
-  const auto upper = upper_of(reader, valid);
-  const auto noise = upper_of(reader, valid);
-  recorded.value.correlation = correlation_of(reader, valid);
-  if (!reader.good() || !valid) return std::nullopt;
+  std::array<double, 7> pose{};
+  reader.f64s(pose);
+  bool valid = recorded.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime;
+  Covariance::Upper upper{};
+  Covariance::Upper noise{};
+  const bool given = read_upper(reader, upper, valid);
+  const bool noisy = read_upper(reader, noise, valid);
+  read_correlation(reader, value.correlation, valid);
+  if (!reader.good() || !valid) return false;
+  std::optional<Covariance::Upper>& last = last_of(*recorded.edge);
   if (is == CovarianceIs::kAsBefore) {
-    const auto before = last_.find(recorded.edge.id);
-    if (before == last_.end()) return std::nullopt;
-    std::copy(before->second.upper().begin(), before->second.upper().end(), flat.begin() + 7);
-  } else if (upper) {
-    std::copy(upper->begin(), upper->end(), flat.begin() + 7);
-  } else if (is != CovarianceIs::kUnspecified) {
-    return std::nullopt;
+    if (!last) return false;
+    upper = *last;
+  } else if (!given && is != CovarianceIs::kUnspecified) {
+    return false;
   }
-  auto X_PC = computed_from(flat);
-  if (!X_PC) return std::nullopt;
-  if (is == CovarianceIs::kGiven) last_[recorded.edge.id] = X_PC->covariance.of_specified();
-  recorded.value.X_PC = *X_PC;
-  recorded.value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
-  if (stamp >= 0) recorded.value.stamp = time_of(stamp);
-  recorded.value.cleared = stamp == kCleared;
-  recorded.value.unsampled = stamp == kUnsampled;
-  if (begins == Begins::kNot) return recorded;
-  recorded.value.begins.emplace();
-  recorded.value.drifts = begins == Begins::kDrifting;
-  if (noise) {
-    const auto checked = Covariance::from_upper(*noise);
-    if (!checked) return std::nullopt;
-    recorded.value.begins = *checked;
+  Flat flat{};
+  std::copy(pose.begin(), pose.end(), flat.begin());
+  std::copy(upper.begin(), upper.end(), flat.begin() + pose.size());
+  const auto X_PC = computed_from(flat);
+  if (!X_PC) return false;
+  if (is == CovarianceIs::kGiven) last = upper;
+  value.X_PC = *X_PC;
+  value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
+  if (stamp >= 0) value.stamp = time_of(stamp);
+  value.cleared = stamp == kCleared;
+  value.unsampled = stamp == kUnsampled;
+  if (begins == Begins::kNot) return true;
+  value.begins.emplace();
+  value.drifts = begins == Begins::kDrifting;
+  if (noisy) {
+    const auto checked = Covariance::from_upper(noise);
+    if (!checked) return false;
+    value.begins = *checked;
   }
-  return recorded;
+  return true;
 }
 
 Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
@@ -200,10 +212,12 @@ Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("values");
   all.values.reserve(count);
   std::vector<std::uint32_t> numbers;  // of the values that are valid
+  numbers.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (auto value = decode_value(reader)) {
-      all.values.push_back(*std::move(value));
+    if (decode_value(reader, all.values.emplace_back())) {
       numbers.push_back(i);
+    } else {
+      all.values.pop_back();
     }
     if (!reader.good()) return invalid("values");
   }
@@ -257,7 +271,7 @@ Result<RecordedFrames> decode_frames(std::string_view message) {
     WatchedFrame frame;
     frame.id = reader.text();
     frame.parent = reader.text();
-    if (check_id(frame.id, "id") && (frame.parent.empty() || is_edge(frame))) {
+    if (check_id(frame.id, "id") && (frame.parent.empty() || is_edge(frame.id, frame.parent))) {
       all.frames.push_back(std::move(frame));
     }
   }

@@ -15,6 +15,7 @@
 #include "tfdude/types/partition_news.hpp"
 
 #include "base/cdr.hpp"
+#include "recording/edge_table.hpp"
 
 // The messages of a recording: to bytes, and from bytes of unknown origin.
 namespace tfdude::recording {
@@ -29,9 +30,9 @@ inline constexpr std::int64_t kMaxTime = 4'000'000'000'000'000'000;
 
 /// A value of an edge.
 struct RecordedValue {
-  WatchedFrame edge;
-  WatchedValue value;  ///< its frame is not used
-  bool dated = false;  ///< of ROS: its stamp was 0, which nobody has set
+  const RecordedEdge* edge = nullptr;  ///< of the table of who has read the message
+  WatchedValue value;                  ///< its frame is not used
+  bool dated = false;                  ///< of ROS: its stamp was 0, which nobody has set
 };
 
 struct RecordedValues {
@@ -83,14 +84,23 @@ class ValuesEncoder {
 /// Reads values, in the order of the file from a keyframe or the beginning on.
 class ValuesDecoder {
  public:
+  /// @param edges  gets those of the values, and must outlive them
+  explicit ValuesDecoder(EdgeTable& edges) : edges_(&edges) {}
+
   /// @return kState: not a valid message; values that are not valid are left out
   [[nodiscard]] Result<RecordedValues> decode(std::string_view message);
 
  private:
-  [[nodiscard]] std::optional<RecordedValue> decode_value(CdrReader& reader);
+  // @return whether it is valid
+  [[nodiscard]] bool decode_value(CdrReader& reader, RecordedValue& recorded);
+  // Null: it is not valid.
+  [[nodiscard]] const RecordedEdge* decode_edge(CdrReader& reader);
+  [[nodiscard]] std::optional<Covariance::Upper>& last_of(const RecordedEdge& edge);
   static void decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
                           std::vector<RecordedValue>& values);
-  std::unordered_map<std::string, Covariance> last_;  // by frame
+
+  EdgeTable* edges_;
+  std::vector<std::optional<Covariance::Upper>> last_;  // by RecordedEdge::frame
 };
 
 void encode(const RecordedFrames& frames, std::string& out);
@@ -112,6 +122,7 @@ struct RecordedTransforms {
 };
 
 /// By the rules of the bridge to ROS. @return kState: not a valid message
-[[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message);
+/// @param edges  as of ValuesDecoder
+[[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges);
 
 }  // namespace tfdude::recording

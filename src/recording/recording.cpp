@@ -409,7 +409,7 @@ Result<std::vector<HistoryInfo>> Recording::history(const std::string& id) {
     const auto* values = std::get_if<RecordedValues>(&message.what);
     if (values == nullptr || values->repeats) return true;
     for (const RecordedValue& value : values->values) {
-      if (value.edge.id != id) continue;
+      if (value.edge->id != id) continue;
       found = true;
       if (value.value.stamp) gaps.add(*value.value.stamp);
     }
