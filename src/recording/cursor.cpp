@@ -1,6 +1,8 @@
 #include "recording/cursor.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -78,8 +80,11 @@ bool Cursor::has(const ChunkPlace& chunk, Topic topic) const {
 }
 
 void Cursor::begin_at(std::size_t chunk) {
+  if (ahead_.valid()) ahead_.get();
   first_chunk_ = chunk_ = chunk;
-  waiting_.clear();
+  loaded_ = {};
+  waiting_ = {};
+  front_is_taken_ = false;
   decoder_ = ValuesDecoder(*edges_);
   counts_ = {};
   transforms_ = {};
@@ -98,11 +103,18 @@ void Cursor::start(Time from) {
     if (!chunks.empty() && checked_time(chunks.front().start) < from) statics_before_ = from;
     return;
   }
+  begin_at(keyframe_before(from));
+}
+
+bool Cursor::skips(Time from) const { return !foreign_ && keyframe_before(from) > chunk_; }
+
+std::size_t Cursor::keyframe_before(Time from) const {
   const auto& chunks = reader_.chunks();
-  for (std::size_t i = 0; i < chunks.size(); ++i) {
-    if (checked_time(chunks[i].start) > from) break;
-    if (has(chunks[i], Topic::kKeyframe)) begin_at(i);
+  std::size_t place = 0;
+  for (std::size_t i = 0; i < chunks.size() && checked_time(chunks[i].start) <= from; ++i) {
+    if (has(chunks[i], Topic::kKeyframe)) place = i;
   }
+  return place;
 }
 
 bool Cursor::is_wanted(const ChunkPlace& chunk, bool statics_only) const {
@@ -133,7 +145,7 @@ void Cursor::load(const ChunkPlace& chunk) {
   if (!read) note(read.error().message);
   if (!foreign_) return;
   std::stable_sort(
-      waiting_.begin(), waiting_.end(),
+      loaded_.begin(), loaded_.end(),
       [](const RecordedMessage& a, const RecordedMessage& b) { return a.log < b.log; });
   date_transforms();
 }
@@ -144,7 +156,8 @@ void Cursor::load(const ChunkPlace& chunk) {
 // such sample it goes on from there.
 void Cursor::date_transforms() {
   const auto each_sample = [&](auto visit) {
-    for (auto message = waiting_.rbegin(); message != waiting_.rend(); ++message) {
+    for (auto message = loaded_.end(); message != loaded_.begin();) {
+      --message;
       auto& values = std::get<RecordedValues>(message->what).values;
       for (auto value = values.rbegin(); value != values.rend(); ++value) {
         if (value->value.stamp && !visit(message->log, *value)) return;
@@ -179,14 +192,14 @@ void Cursor::add(const Message& message, bool statics_only) {
 Result<void> Cursor::decode(Topic topic, const Message& message) {
   const auto take = [&](auto decoded) -> Result<void> {
     if (!decoded) return tl::unexpected(std::move(decoded.error()));
-    waiting_.push_back({log_of(message), *std::move(decoded), false});
+    loaded_.add() = {log_of(message), *std::move(decoded), false};
     return {};
   };
   switch (topic) {
     case Topic::kFrames:
       return take(decode_frames(message.data));
     case Topic::kValues:
-      return take(decoder_.decode(message.data));
+      return decode_values(message);
     case Topic::kJoints:
       return take(decode_joints(message.data));
     case Topic::kEvents:
@@ -199,6 +212,18 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
       return {};
   }
   return {};
+}
+
+// Most messages are these, so they reuse the memory of earlier ones.
+Result<void> Cursor::decode_values(const Message& message) {
+  RecordedMessage& recorded = loaded_.add();
+  auto* values = std::get_if<RecordedValues>(&recorded.what);
+  if (values == nullptr) values = &recorded.what.emplace<RecordedValues>();
+  recorded.log = log_of(message);
+  recorded.foreign = false;
+  auto ok = decoder_.decode(message.data, *values);
+  if (!ok) loaded_.drop_last();
+  return ok;
 }
 
 Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
@@ -214,26 +239,70 @@ Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
   }
   counts_ += transforms->counts;
   for (std::string& why : transforms->left_out) note(std::move(why));
-  waiting_.push_back({log_of(message),
-                      RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)},
-                      true});
+  loaded_.add() = {log_of(message),
+                   RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)},
+                   true};
   return {};
 }
 
+std::future<void> Cursor::ReadsAhead::begin(const ChunkPlace& chunk) {
+  task_ = std::packaged_task<void()>([this, &chunk] { cursor_.load(chunk); });
+  auto ended = task_.get_future();
+  job_.ask();
+  return ended;
+}
+
+void Cursor::begin_to_read_ahead() {
+  if (reads_ahead_ == nullptr || foreign_ || chunk_ == reader_.chunks().size()) return;
+  try {
+    ahead_ = reads_ahead_->begin(reader_.chunks()[chunk_]);
+    ++chunk_;
+  } catch (const std::system_error&) {  // there are too many threads
+    reads_ahead_ = nullptr;
+  }
+}
+
+void Cursor::end_reading_ahead() {
+  reads_ahead_ = nullptr;
+  if (ahead_.valid()) ahead_.get();
+}
+
+// Puts the messages of the next chunk where they wait. @return whether there is one
+bool Cursor::fetch() {
+  if (ahead_.valid()) {
+    ahead_.get();
+  } else if (loaded_.empty()) {
+    if (chunk_ == reader_.chunks().size()) return false;
+    load(reader_.chunks()[chunk_++]);
+  }
+  waiting_.clear();
+  std::swap(waiting_, loaded_);
+  begin_to_read_ahead();
+  return true;
+}
+
 std::optional<Time> Cursor::peek() {
-  while (waiting_.empty() && chunk_ < reader_.chunks().size()) load(reader_.chunks()[chunk_++]);
+  while (waiting_.empty() && fetch()) {
+  }
   if (waiting_.empty()) return std::nullopt;
   return waiting_.front().log;
 }
 
-std::optional<RecordedMessage> Cursor::next() {
-  if (!peek()) return std::nullopt;
-  RecordedMessage message = std::move(waiting_.front());
-  waiting_.pop_front();
-  if (message.foreign) {
+const RecordedMessage* Cursor::front() {
+  if (!peek()) return nullptr;
+  RecordedMessage& message = waiting_.front();
+  if (message.foreign && !std::exchange(front_is_taken_, true)) {
     transforms_.take(std::get<RecordedValues>(message.what).values, counts_,
                      [this](std::string problem) { note(std::move(problem)); });
   }
+  return &message;
+}
+
+const RecordedMessage* Cursor::next() {
+  const RecordedMessage* message = front();
+  if (message == nullptr) return nullptr;
+  waiting_.pop();
+  front_is_taken_ = false;
   return message;
 }
 

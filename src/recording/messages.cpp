@@ -202,40 +202,37 @@ bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& recorded) {
   return true;
 }
 
-Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
+Result<void> ValuesDecoder::decode(std::string_view message, RecordedValues& all) {
   CdrReader reader(message);
-  RecordedValues all;
   all.partition = reader.text();
   all.commit = reader.u64();
   all.repeats = reader.flag();
   const std::uint32_t count = reader.count(kLeastValue);
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("values");
   all.values.reserve(count);
-  std::vector<std::uint32_t> numbers;  // of the values that are valid
-  numbers.reserve(count);
+  numbers_.clear();
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (decode_value(reader, all.values.emplace_back())) {
-      numbers.push_back(i);
-    } else {
-      all.values.pop_back();
-    }
+    const std::size_t valid = numbers_.size();
+    RecordedValue& value =
+        valid < all.values.size() ? all.values[valid] = {} : all.values.emplace_back();
+    if (decode_value(reader, value)) numbers_.push_back(i);
     if (!reader.good()) return invalid("values");
   }
-  decode_kept(reader, numbers, all.values);
+  all.values.resize(numbers_.size());
+  decode_kept(reader, all.values);
   if (!reader.good()) return invalid("values");
-  return all;
+  return {};
 }
 
 // Earlier versions did not write this.
-void ValuesDecoder::decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
-                                std::vector<RecordedValue>& values) {
+void ValuesDecoder::decode_kept(CdrReader& reader, std::vector<RecordedValue>& values) const {
   if (reader.left() == 0) return;
   for (std::uint32_t left = reader.count(kLeastKept); left > 0 && reader.good(); --left) {
     const std::uint32_t number = reader.u32();
     const std::int64_t before = reader.i64();
-    const auto found = std::lower_bound(numbers.begin(), numbers.end(), number);
-    if (found == numbers.end() || *found != number || before < 0 || before > kMaxTime) continue;
-    WatchedValue& value = values[static_cast<std::size_t>(found - numbers.begin())].value;
+    const auto found = std::lower_bound(numbers_.begin(), numbers_.end(), number);
+    if (found == numbers_.end() || *found != number || before < 0 || before > kMaxTime) continue;
+    WatchedValue& value = values[static_cast<std::size_t>(found - numbers_.begin())].value;
     if (value.begins) value.kept_before = time_of(before);
   }
 }

@@ -5,7 +5,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -87,8 +86,9 @@ class ValuesDecoder {
   /// @param edges  gets those of the values, and must outlive them
   explicit ValuesDecoder(EdgeTable& edges) : edges_(&edges) {}
 
+  /// @param out  replaced, so that its memory can be used again; of no use after an error
   /// @return kState: not a valid message; values that are not valid are left out
-  [[nodiscard]] Result<RecordedValues> decode(std::string_view message);
+  [[nodiscard]] Result<void> decode(std::string_view message, RecordedValues& out);
 
  private:
   // @return whether it is valid
@@ -96,11 +96,11 @@ class ValuesDecoder {
   // Null: it is not valid.
   [[nodiscard]] const RecordedEdge* decode_edge(CdrReader& reader);
   [[nodiscard]] std::optional<Covariance::Upper>& last_of(const RecordedEdge& edge);
-  static void decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
-                          std::vector<RecordedValue>& values);
+  void decode_kept(CdrReader& reader, std::vector<RecordedValue>& values) const;
 
   EdgeTable* edges_;
   std::vector<std::optional<Covariance::Upper>> last_;  // by RecordedEdge::frame
+  std::vector<std::uint32_t> numbers_;  // of the values that are valid, in their message
 };
 
 void encode(const RecordedFrames& frames, std::string& out);
