@@ -7,14 +7,17 @@
 //   same     the covariance of an edge is always the same, so it is written seldom
 //   other    each sample has another one
 // and
-//   first    the call, and to open the file
-//   again    the same call once more
-//   single   lookup_at(), at one of 50 instants
+//   first     the call, and to open the file
+//   again     the same call once more
+//   shuffled  the same, with the instants in any order
+//   single    lookup_at(), at each of 50 instants in any order
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <unistd.h>
@@ -33,7 +36,7 @@ using namespace tfdude;
 
 constexpr std::size_t kEdges = 10;
 constexpr int kRepetitions = 3;
-constexpr int kSingle = 50;
+constexpr std::size_t kSingle = 50;
 constexpr auto kStart = std::chrono::seconds(1'000'000'000);
 
 struct Size {
@@ -121,10 +124,10 @@ class Timed {
  public:
   explicit Timed(std::string key) : series_(std::move(key), "ms") {}
   template <class Measured>
-  void measure(Measured measured, int count = 1) {
+  void measure(Measured measured, std::size_t count = 1) {
     const auto begin = bench::Clock::now();
     measured();
-    series_.add(bench::microseconds_since(begin) / 1e3 / count);
+    series_.add(bench::microseconds_since(begin) / 1e3 / static_cast<double>(count));
     series_.end_repetition();
   }
   void print() const { series_.print(); }
@@ -135,11 +138,13 @@ class Timed {
 
 void ask(const std::string& file, const Size& size, const std::string& kind) {
   testing::Random random(12);
-  std::vector<Time> instants;
+  std::vector<Time> shuffled;
   for (std::size_t i = 0; i < size.instants; ++i) {
-    instants.push_back(size.at(random.uniform(1, static_cast<double>(size.samples()) - 2)));
+    shuffled.push_back(size.at(random.uniform(1, static_cast<double>(size.samples()) - 2)));
   }
-  const auto call = [&](Recording& recording) {
+  std::vector<Time> sorted = shuffled;
+  std::sort(sorted.begin(), sorted.end());
+  const auto call = [&](Recording& recording, const std::vector<Time>& instants) {
     const Trajectory all = recording.trajectory(frame(0), frame(kEdges), instants);
     if (all.missing.empty()) return;
     std::fprintf(stderr, "%s\n", all.missing.front().error.message.c_str());
@@ -147,25 +152,26 @@ void ask(const std::string& file, const Size& size, const std::string& kind) {
   };
   Timed first("trajectory/" + kind + "/first");
   Timed again("trajectory/" + kind + "/again");
+  Timed any("trajectory/" + kind + "/shuffled");
   Timed single("trajectory/" + kind + "/single");
+  const auto look_up = [&](Recording& recording) {
+    for (std::size_t i = 0; i < kSingle; ++i) {
+      good(recording.lookup_at(frame(0), frame(kEdges), shuffled[i]));
+    }
+  };
   for (int i = 0; i < kRepetitions; ++i) {
     std::optional<Recording> recording;
     first.measure([&] {
       recording = good(Recording::open(file));
-      call(*recording);
+      call(*recording, sorted);
     });
-    again.measure([&] { call(*recording); });
-    single.measure(
-        [&] {
-          for (int k = 0; k < kSingle; ++k) {
-            good(recording->lookup_at(frame(0), frame(kEdges),
-                                      instants[static_cast<std::size_t>(k)]));
-          }
-        },
-        kSingle);
+    again.measure([&] { call(*recording, sorted); });
+    any.measure([&] { call(*recording, shuffled); });
+    single.measure([&] { look_up(*recording); }, kSingle);
   }
   first.print();
   again.print();
+  any.print();
   single.print();
 }
 

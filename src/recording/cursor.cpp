@@ -106,7 +106,10 @@ void Cursor::start(Time from) {
   begin_at(keyframe_before(from));
 }
 
-bool Cursor::skips(Time from) const { return !foreign_ && keyframe_before(from) > chunk_; }
+bool Cursor::skips(Time from) const {
+  if (ahead_.valid()) ahead_.wait();
+  return !foreign_ && keyframe_before(from) > chunk_;
+}
 
 std::size_t Cursor::keyframe_before(Time from) const {
   const auto& chunks = reader_.chunks();
@@ -134,20 +137,33 @@ void Cursor::note(std::string problem) {
   }
 }
 
-void Cursor::load(const ChunkPlace& chunk) {
+// @return the bytes of its messages
+std::size_t Cursor::load(const ChunkPlace& chunk) {
+  std::size_t bytes = 0;
   const bool statics_only = statics_before_ && checked_time(chunk.end) < *statics_before_;
-  if (!is_wanted(chunk, statics_only)) return;
+  if (!is_wanted(chunk, statics_only)) return bytes;
   auto read = reader_.read(chunk, [&](const Message& message) {
     find_topics();
     add(message, statics_only);
+    bytes += message.data.size();
     return true;
   });
   if (!read) note(read.error().message);
-  if (!foreign_) return;
+  if (!foreign_) return bytes;
   std::stable_sort(
       loaded_.begin(), loaded_.end(),
       [](const RecordedMessage& a, const RecordedMessage& b) { return a.log < b.log; });
   date_transforms();
+  return bytes;
+}
+
+// The last chunk before a keyframe may be small. While it is taken, there would be too little time
+// for the next one.
+void Cursor::load_ahead() {
+  constexpr std::size_t kLeast = std::size_t{1} << 20U;
+  for (std::size_t bytes = 0; bytes < kLeast && chunk_ < reader_.chunks().size();) {
+    bytes += load(reader_.chunks()[chunk_++]);
+  }
 }
 
 // A stamp of 0 was not set: as in the bridge, the value is one of the time of its arrival. If the
@@ -160,22 +176,22 @@ void Cursor::date_transforms() {
       --message;
       auto& values = std::get<RecordedValues>(message->what).values;
       for (auto value = values.rbegin(); value != values.rend(); ++value) {
-        if (value->value.stamp && !visit(message->log, *value)) return;
+        if (value->stamp && !visit(message->log, *value)) return;
       }
     }
   };
   each_sample([&](Time log, const RecordedValue& value) {
-    if (!value.dated) behind_ = log - *value.value.stamp;
+    if (!value.dated) behind_ = log - *value.stamp;
     return value.dated;
   });
   auto behind = behind_.value_or(std::chrono::nanoseconds());
   each_sample([&](Time log, RecordedValue& value) {
     if (!value.dated) {
-      behind = log - *value.value.stamp;
+      behind = log - *value.stamp;
       return true;
     }
     const bool other_clock = std::chrono::abs(behind) > kOtherClock;
-    value.value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
+    value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
     ++counts_.unstamped;
     note("frame " + quote(value.edge->id) +
          ": its messages have no stamp (0): taken as of the time when they were logged");
@@ -234,7 +250,7 @@ Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
   }
   for (RecordedValue& value : transforms->values) {
     if (!is_static) continue;
-    value.value.stamp.reset();
+    value.stamp.reset();
     value.dated = false;
   }
   counts_ += transforms->counts;
@@ -245,8 +261,8 @@ Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
   return {};
 }
 
-std::future<void> Cursor::ReadsAhead::begin(const ChunkPlace& chunk) {
-  task_ = std::packaged_task<void()>([this, &chunk] { cursor_.load(chunk); });
+std::future<void> Cursor::ReadsAhead::begin() {
+  task_ = std::packaged_task<void()>([this] { cursor_.load_ahead(); });
   auto ended = task_.get_future();
   job_.ask();
   return ended;
@@ -255,8 +271,7 @@ std::future<void> Cursor::ReadsAhead::begin(const ChunkPlace& chunk) {
 void Cursor::begin_to_read_ahead() {
   if (reads_ahead_ == nullptr || foreign_ || chunk_ == reader_.chunks().size()) return;
   try {
-    ahead_ = reads_ahead_->begin(reader_.chunks()[chunk_]);
-    ++chunk_;
+    ahead_ = reads_ahead_->begin();
   } catch (const std::system_error&) {  // there are too many threads
     reads_ahead_ = nullptr;
   }
@@ -273,7 +288,7 @@ bool Cursor::fetch() {
     ahead_.get();
   } else if (loaded_.empty()) {
     if (chunk_ == reader_.chunks().size()) return false;
-    load(reader_.chunks()[chunk_++]);
+    (void)load(reader_.chunks()[chunk_++]);
   }
   waiting_.clear();
   std::swap(waiting_, loaded_);

@@ -51,9 +51,9 @@ class Cursor {
   void only(Topic topic) { only_ = topic; }
   void all_topics() { only_.reset(); }
 
-  /// While it exists, the cursor reads the next chunk on another thread, for those who read on. The
-  /// messages are the same. In foreign files it has no effect, as each chunk depends on what was
-  /// taken of those before.
+  /// While it exists, the cursor reads the next chunk on another thread, for those who read on;
+  /// problems() and reader() must not be used meanwhile. The messages are the same. In foreign
+  /// files it has no effect, as what is read and what is taken is counted together.
   class ReadsAhead {
    public:
     explicit ReadsAhead(Cursor& cursor) : cursor_(cursor) { cursor_.reads_ahead_ = this; }
@@ -64,7 +64,7 @@ class Cursor {
    private:
     friend class Cursor;
 
-    [[nodiscard]] std::future<void> begin(const ChunkPlace& chunk);
+    [[nodiscard]] std::future<void> begin();
 
     Cursor& cursor_;
     std::packaged_task<void()> task_;
@@ -95,7 +95,8 @@ class Cursor {
   [[nodiscard]] bool fetch();
   void begin_to_read_ahead();
   void end_reading_ahead();
-  void load(const ChunkPlace& chunk);
+  std::size_t load(const ChunkPlace& chunk);
+  void load_ahead();
   void add(const Message& message, bool statics_only);
   [[nodiscard]] Result<void> decode(Topic topic, const Message& message);
   [[nodiscard]] Result<void> decode_values(const Message& message);

@@ -48,9 +48,9 @@ bool ForeignTransforms::takes(RecordedValue& value, TransformCounts& counts, con
   }
   Edge& edge = edges_[id];
   if (moves) edge = Edge{value.edge->parent};
-  if (value.value.stamp) return takes_sample(value, edge, counts, report);
+  if (value.stamp) return takes_sample(value, edge, counts, report);
   // From now on it is static, without the samples from before.
-  if (!edge.is_static) value.value.begins = Covariance();
+  if (!edge.is_static) value.more().begins = Covariance();
   edge = Edge{value.edge->parent};
   return true;
 }
@@ -58,18 +58,18 @@ bool ForeignTransforms::takes(RecordedValue& value, TransformCounts& counts, con
 bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, TransformCounts& counts,
                                      const Report& report) {
   const auto who = [&] { return "frame " + quote(value.edge->id); };
-  Time& stamp = *value.value.stamp;
+  Time& stamp = *value.stamp;
   const Time newest = edge.seen.empty() ? stamp : edge.seen.back().stamp;
   if (newest - stamp > kJumpBack) {
     ++counts.jumps;
     report(who() + ": time has jumped back by more than a second: its samples before are dropped");
     edge = Edge{edge.parent};
-    value.value.begins = Covariance();
+    value.more().begins = Covariance();
   } else if (value.dated) {
     stamp = std::max(stamp, newest);  // while the clock stands still, the last one counts
   }
   edge.is_static = false;
-  const Seen seen{stamp, hash_of(value.value.X_PC.pose)};
+  const Seen seen{stamp, hash_of(value.X_PC.pose)};
   const auto place =
       std::lower_bound(edge.seen.begin(), edge.seen.end(), stamp,
                        [](const Seen& one, Time other) { return one.stamp < other; });

@@ -66,7 +66,8 @@ void put(CdrWriter& writer, const Correlation& correlation) {
   for (const std::string& edge : correlation.observed_with) writer.text(edge);
 }
 
-void read_correlation(CdrReader& reader, Correlation& correlation, bool& valid) {
+Correlation correlation_of(CdrReader& reader, bool& valid) {
+  Correlation correlation;
   correlation.unknown = reader.flag();
   const std::uint32_t errors = reader.count(12);
   for (std::uint32_t i = 0; i < errors && reader.good(); ++i) {
@@ -89,6 +90,7 @@ void read_correlation(CdrReader& reader, Correlation& correlation, bool& valid) 
     valid = valid && check_id(correlation.observed_with.back(), "id");
   }
   valid = valid && (errors == 0 || check_common_errors(correlation.common_errors));
+  return correlation;
 }
 
 bool is_edge(std::string_view id, std::string_view parent) {
@@ -96,6 +98,18 @@ bool is_edge(std::string_view id, std::string_view parent) {
 }
 
 }  // namespace
+
+WatchedValue RecordedValue::watched(std::uint32_t frame) const {
+  WatchedValue value{frame, stamp, X_PC};
+  value.cleared = cleared;
+  value.unsampled = unsampled;
+  if (rest == nullptr) return value;
+  value.correlation = rest->correlation;
+  value.begins = rest->begins;
+  value.kept_before = rest->kept_before;
+  value.drifts = rest->drifts;
+  return value;
+}
 
 ValuesEncoder::ValuesEncoder(std::string& out, std::string_view partition, std::uint64_t commit,
                              bool repeats)
@@ -158,22 +172,21 @@ std::optional<Covariance::Upper>& ValuesDecoder::last_of(const RecordedEdge& edg
   return last_[edge.frame];
 }
 
-bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& recorded) {
-  WatchedValue& value = recorded.value;
-  recorded.edge = decode_edge(reader);
+bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& value) {
+  value.edge = decode_edge(reader);
   const std::int64_t stamp = reader.i64();
   const auto is = static_cast<CovarianceIs>(reader.u8());
   const auto begins = static_cast<Begins>(reader.u8());
   std::array<double, 7> pose{};
   reader.f64s(pose);
-  bool valid = recorded.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime;
+  bool valid = value.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime;
   Covariance::Upper upper{};
   Covariance::Upper noise{};
   const bool given = read_upper(reader, upper, valid);
   const bool noisy = read_upper(reader, noise, valid);
-  read_correlation(reader, value.correlation, valid);
+  Correlation correlation = correlation_of(reader, valid);
   if (!reader.good() || !valid) return false;
-  std::optional<Covariance::Upper>& last = last_of(*recorded.edge);
+  std::optional<Covariance::Upper>& last = last_of(*value.edge);
   if (is == CovarianceIs::kAsBefore) {
     if (!last) return false;
     upper = *last;
@@ -188,18 +201,18 @@ bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& recorded) {
   if (is == CovarianceIs::kGiven) last = upper;
   value.X_PC = *X_PC;
   value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
-  if (stamp >= 0) value.stamp = time_of(stamp);
+  value.stamp = stamp >= 0 ? std::optional(time_of(stamp)) : std::nullopt;
   value.cleared = stamp == kCleared;
   value.unsampled = stamp == kUnsampled;
+  value.rest.reset();
+  if (!correlation.empty()) value.more().correlation = std::move(correlation);
   if (begins == Begins::kNot) return true;
-  value.begins.emplace();
-  value.drifts = begins == Begins::kDrifting;
-  if (noisy) {
-    const auto checked = Covariance::from_upper(noise);
-    if (!checked) return false;
-    value.begins = *checked;
-  }
-  return true;
+  value.more().begins.emplace();
+  value.more().drifts = begins == Begins::kDrifting;
+  if (!noisy) return true;
+  const auto checked = Covariance::from_upper(noise);
+  if (checked) value.more().begins = *checked;
+  return checked.has_value();
 }
 
 Result<void> ValuesDecoder::decode(std::string_view message, RecordedValues& all) {
@@ -214,7 +227,7 @@ Result<void> ValuesDecoder::decode(std::string_view message, RecordedValues& all
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::size_t valid = numbers_.size();
     RecordedValue& value =
-        valid < all.values.size() ? all.values[valid] = {} : all.values.emplace_back();
+        valid < all.values.size() ? all.values[valid] : all.values.emplace_back();
     if (decode_value(reader, value)) numbers_.push_back(i);
     if (!reader.good()) return invalid("values");
   }
@@ -232,8 +245,8 @@ void ValuesDecoder::decode_kept(CdrReader& reader, std::vector<RecordedValue>& v
     const std::int64_t before = reader.i64();
     const auto found = std::lower_bound(numbers_.begin(), numbers_.end(), number);
     if (found == numbers_.end() || *found != number || before < 0 || before > kMaxTime) continue;
-    WatchedValue& value = values[static_cast<std::size_t>(found - numbers_.begin())].value;
-    if (value.begins) value.kept_before = time_of(before);
+    RecordedValue& value = values[static_cast<std::size_t>(found - numbers_.begin())];
+    if (value.rest && value.rest->begins) value.rest->kept_before = time_of(before);
   }
 }
 

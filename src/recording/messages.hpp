@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -29,9 +30,29 @@ inline constexpr std::int64_t kMaxTime = 4'000'000'000'000'000'000;
 
 /// A value of an edge.
 struct RecordedValue {
+  /// What few values have; as of WatchedValue.
+  struct Rest {
+    Correlation correlation;
+    std::optional<Covariance> begins;
+    std::optional<Time> kept_before;
+    bool drifts = false;
+  };
+
+  /// Whether it is a sample, and tells nothing else.
+  [[nodiscard]] bool is_sample() const { return stamp && !cleared && !unsampled && !rest; }
+  [[nodiscard]] Rest& more() {
+    if (rest == nullptr) rest = std::make_unique<Rest>();
+    return *rest;
+  }
+  [[nodiscard]] WatchedValue watched(std::uint32_t frame) const;
+
   const RecordedEdge* edge = nullptr;  ///< of the table of who has read the message
-  WatchedValue value;                  ///< its frame is not used
-  bool dated = false;                  ///< of ROS: its stamp was 0, which nobody has set
+  std::optional<Time> stamp;
+  Transform X_PC;
+  bool cleared = false;
+  bool unsampled = false;
+  bool dated = false;          ///< of ROS: its stamp was 0, which nobody has set
+  std::unique_ptr<Rest> rest;  ///< null: nothing of that
 };
 
 struct RecordedValues {
@@ -92,7 +113,7 @@ class ValuesDecoder {
 
  private:
   // @return whether it is valid
-  [[nodiscard]] bool decode_value(CdrReader& reader, RecordedValue& recorded);
+  [[nodiscard]] bool decode_value(CdrReader& reader, RecordedValue& value);
   // Null: it is not valid.
   [[nodiscard]] const RecordedEdge* decode_edge(CdrReader& reader);
   [[nodiscard]] std::optional<Covariance::Upper>& last_of(const RecordedEdge& edge);

@@ -46,11 +46,9 @@ bool PathAppends::only_appends(const State& state, const RecordedMessage& messag
   for (const RecordedValue& one : values->values) {
     std::optional<Time>* newest = newest_of(*one.edge);
     if (newest == nullptr) continue;
-    const WatchedValue& value = one.value;
-    const bool appends = value.stamp && *newest && *value.stamp > **newest && !value.begins &&
-                         !value.cleared && !value.unsampled && value.correlation.empty();
+    const bool appends = one.is_sample() && *newest && *one.stamp > **newest;
     if (!appends) return false;
-    *newest = value.stamp;
+    *newest = one.stamp;
   }
   return true;
 }

@@ -99,11 +99,8 @@ class Recording::Impl {
     Cursor& cursor = reading_.cursor();
     cursor.rewind();
     if (only) cursor.only(*only);
-    {
-      const Cursor::ReadsAhead ahead(cursor);
-      while (const RecordedMessage* message = cursor.next()) {
-        if (message->log >= from && !visit(*message)) break;
-      }
+    while (const RecordedMessage* message = cursor.next()) {
+      if (message->log >= from && !visit(*message)) break;
     }
     cursor.all_topics();
     reading_.load_again();
@@ -112,10 +109,7 @@ class Recording::Impl {
   void read_all() {
     Cursor& cursor = reading_.cursor();
     cursor.rewind();
-    {
-      const Cursor::ReadsAhead ahead(cursor);
-      while (cursor.next() != nullptr) {
-      }
+    while (cursor.next() != nullptr) {
     }
     counts_ = cursor.counts();
     reading_.load_again();
@@ -258,7 +252,7 @@ Result<std::vector<HistoryInfo>> Recording::history(const std::string& id) {
     for (const RecordedValue& value : values->values) {
       if (value.edge->id != id) continue;
       found = true;
-      if (value.value.stamp) gaps.add(*value.value.stamp);
+      if (value.stamp) gaps.add(*value.stamp);
     }
     return true;
   });

@@ -157,35 +157,54 @@ std::optional<Handle> State::edge_of(Known& known, const RecordedEdge& edge, boo
 void State::apply(const RecordedValues& recorded, bool foreign) {
   Known& known = partition(recorded.partition);
   if (!recorded.repeats) known.returned.reset();
-  edges_.clear();
-  values_.clear();
+  known.info.reachable = known.info.reachable || foreign;
+  if (!take_samples(known, recorded)) take_values(known, recorded, foreign);
+  known.info.frames = known.frames.size();
+}
+
+// Most messages only have samples of edges that are known. @return whether this is one
+bool State::take_samples(const Known& known, const RecordedValues& recorded) {
+  if (recorded.repeats) return false;
+  samples_.clear();
+  for (const RecordedValue& one : recorded.values) {
+    const auto frame = settled(known, *one.edge);
+    if (!frame || !one.is_sample()) return false;
+    samples_.push_back({*frame, nanoseconds(*one.stamp), &one.X_PC});
+  }
+  forest_.take(samples_);
+  return true;
+}
+
+void State::take_values(Known& known, const RecordedValues& recorded, bool foreign) {
+  std::vector<Handle> edges;
+  std::vector<PushedValue> values;
   for (const RecordedValue& one : recorded.values) {
     const RecordedEdge& edge = *one.edge;
-    auto handle = settled(known, edge);
+    auto frame = settled(known, edge);
     bool first = false;
-    if (handle && recorded.repeats) continue;
-    if (!handle) {
-      handle = edge_of(known, edge, recorded.repeats, foreign);
-      if (!handle) continue;
+    if (frame && recorded.repeats) continue;
+    if (!frame) {
+      frame = edge_of(known, edge, recorded.repeats, foreign);
+      if (!frame) continue;
       first = valueless_.erase(edge.id) > 0;
-      settle(known, edge, *handle);
+      settle(known, edge, *frame);
     }
-    PushedValue& value = values_.emplace_back();
-    value.index = static_cast<std::uint32_t>(edges_.size());
-    value.stamp = one.value.stamp;
-    value.X = one.value.X_PC;
-    value.correlation = one.value.correlation;
-    value.process_noise = one.value.begins;
-    value.kept_before = one.value.kept_before;
-    value.cleared = one.value.cleared;
-    value.unsampled = one.value.unsampled;
-    value.drifts = one.value.drifts;
+    PushedValue& value = values.emplace_back();
+    value.index = static_cast<std::uint32_t>(edges.size());
+    value.stamp = one.stamp;
+    value.X = one.X_PC;
+    value.cleared = one.cleared;
+    value.unsampled = one.unsampled;
+    if (one.rest) {
+      value.correlation = one.rest->correlation;
+      value.process_noise = one.rest->begins;
+      value.kept_before = one.rest->kept_before;
+      value.drifts = one.rest->drifts;
+    }
     if (first && !value.process_noise) value.process_noise = Covariance();
-    edges_.push_back(*handle);
+    edges.push_back(*frame);
   }
-  known.info.reachable = known.info.reachable || foreign;
-  known.info.frames = known.frames.size();
-  forest_.take(edges_, values_);
+  forest_.take(edges, values);
 }
 
 PartitionNews State::news_of(const RecordedValues& recorded, Known& known) {
@@ -198,8 +217,7 @@ PartitionNews State::news_of(const RecordedValues& recorded, Known& known) {
   for (const RecordedValue& one : recorded.values) {
     const auto frame = known.frames.find(one.edge->id);
     if (frame == known.frames.end() || frame->second != one.edge->parent) continue;
-    news.values.push_back(one.value);
-    news.values.back().frame = known.places.at(one.edge->id);
+    news.values.push_back(one.watched(known.places.at(one.edge->id)));
   }
   return {recorded.partition, std::move(news)};
 }

@@ -81,6 +81,8 @@ class State {
 
   void apply(const RecordedFrames& frames, Time log);
   void apply(const RecordedValues& values, bool foreign);
+  [[nodiscard]] bool take_samples(const Known& known, const RecordedValues& recorded);
+  void take_values(Known& known, const RecordedValues& recorded, bool foreign);
   [[nodiscard]] std::optional<Handle> edge_of(Known& known, const RecordedEdge& edge, bool repeats,
                                               bool foreign);
   [[nodiscard]] static PartitionNews news_of(const RecordedValues& recorded, Known& known);
@@ -104,9 +106,7 @@ class State {
     Handle frame{};
   };
   std::vector<Settled> settled_;
-  // Of the message that is applied; kept to reuse their memory.
-  std::vector<Handle> edges_;
-  std::vector<PushedValue> values_;
+  std::vector<ToldSample> samples_;  // of the message that is applied; kept to reuse its memory
   std::size_t shared_by_ = 0;
   bool frames_changed_ = false;  // by the last message
 };

@@ -62,9 +62,9 @@ Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges)
     RecordedValue recorded;
     recorded.edge = edges.find(edge.id, edge.parent);
     if (recorded.edge == nullptr) recorded.edge = edges.add(edge.id, edge.parent);
-    recorded.value.stamp = time_of(seconds * kSecond + nanos);
-    recorded.dated = recorded.value.stamp == Time();
-    recorded.value.X_PC = {*pose, StatedCovariance::unspecified()};
+    recorded.stamp = time_of(seconds * kSecond + nanos);
+    recorded.dated = recorded.stamp == Time();
+    recorded.X_PC = {*pose, StatedCovariance::unspecified()};
     all.values.push_back(std::move(recorded));
   }
   if (!reader.good()) {

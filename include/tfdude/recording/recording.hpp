@@ -56,7 +56,8 @@ struct RecordedNews {
 ///
 /// Recordings of ROS (MCAP files with tf2_msgs/msg/TFMessage) can be asked as well. Their frames
 /// belong to one partition, "ros", and covariances are unspecified.
-/// @par Memory  At most about 1 GB of samples, mostly much less, and one chunk of the file.
+/// @par Memory  At most about 1 GB of samples, mostly much less, and one chunk of the file; two in
+///   trajectory().
 /// @par Thread safety  One thread at a time.
 class TFDUDE_EXPORT Recording {
  public:

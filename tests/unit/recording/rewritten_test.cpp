@@ -145,13 +145,13 @@ TEST_CASE("what a value continues is written after the values, where earlier ver
   RecordedValues whole;
   REQUIRE(ValuesDecoder(edges).decode(with, whole));
   REQUIRE(whole.values.size() == 2);
-  CHECK(whole.values[0].value.kept_before == at(2));
-  CHECK_FALSE(whole.values[1].value.kept_before);
+  CHECK(whole.values[0].watched(0).kept_before == at(2));
+  CHECK_FALSE(whole.values[1].watched(0).kept_before);
   // As earlier versions have written it.
   RecordedValues earlier;
   REQUIRE(ValuesDecoder(edges).decode(without, earlier));
   REQUIRE(earlier.values.size() == 1);
-  CHECK_FALSE(earlier.values[0].value.kept_before);
+  CHECK_FALSE(earlier.values[0].watched(0).kept_before);
   for (std::size_t size = without.size(); size < with.size(); ++size) {
     RecordedValues cut;
     const bool valid =
