@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -197,6 +198,20 @@ TEST_CASE("recorded trajectory: places of the file that nobody asks for are skip
     if (X) CHECK(transform_diff(*X, *fresh, 1e-12) == "");
     CHECK(recording->instant() >= at);
   }
+  // A chunk that is damaged is left out, and named.
+  {
+    std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+    bytes.seekp(static_cast<std::streamoff>(std::filesystem::file_size(file) / 2));
+    bytes.write("damaged", 7);
+  }
+  instants.clear();
+  for (int ms = 500; ms < 80'000; ms += 2000) instants.push_back(instant(ms));
+  check_each(file, instants, Milliseconds(100));
+  auto damaged = Recording::open(file);
+  REQUIRE(damaged);
+  CHECK(damaged->summary().problems.empty());
+  (void)damaged->trajectory("world", "hand", instants);
+  CHECK(damaged->summary().problems.size() == 1);
   std::filesystem::remove(file);
 }
 
