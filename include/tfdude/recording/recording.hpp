@@ -77,8 +77,8 @@ class TFDUDE_EXPORT Recording {
   /// Reads the whole file, so that summary() knows all that is wrong with it, and left out.
   void read_all();
 
-  /// Goes to an instant. From the next earlier place where all values are written once more, the
-  /// file is read up to there: mostly 8 to 16 MB.
+  /// Goes to an instant. From the next earlier place where all values are written once more, or
+  /// from where it is, the file is read up to there: mostly 8 to 16 MB.
   void seek(Time at);
   /// The instant that is shown.
   [[nodiscard]] Time instant() const;
