@@ -43,15 +43,15 @@ class CdrReader {
   [[nodiscard]] std::uint32_t u32() { return number<std::uint32_t>(); }
   [[nodiscard]] std::uint64_t u64() { return number<std::uint64_t>(); }
   [[nodiscard]] std::int64_t i64() { return static_cast<std::int64_t>(u64()); }
-  [[nodiscard]] double f64() {
-    const std::uint64_t bits = u64();
-    double value = 0;
-    std::memcpy(&value, &bits, sizeof value);
-    return value;
-  }
+  [[nodiscard]] double f64() { return as_f64(u64()); }
   template <class Numbers>
   void f64s(Numbers& values) {
-    for (double& value : values) value = f64();
+    if (values.size() == 0) return;  // without a number nothing is aligned
+    const std::uint8_t* raw = take(values.size() * sizeof(double), sizeof(double));
+    for (double& value : values) {
+      value = raw != nullptr ? as_f64(number_at<std::uint64_t>(raw)) : 0;
+      if (raw != nullptr) raw += sizeof(double);
+    }
   }
 
   /// A text, whose length counts the zero at its end. Some writers leave that zero out.
@@ -106,7 +106,10 @@ class CdrReader {
   template <class Number>
   Number number() {
     const std::uint8_t* raw = take(sizeof(Number), sizeof(Number));
-    if (raw == nullptr) return 0;
+    return raw != nullptr ? number_at<Number>(raw) : Number{};
+  }
+  template <class Number>
+  [[nodiscard]] Number number_at(const std::uint8_t* raw) const {
     std::uint64_t value = 0;
     if (big_endian_) {
       for (std::size_t i = 0; i < sizeof(Number); ++i) value = value << 8U | raw[i];
@@ -114,6 +117,12 @@ class CdrReader {
       for (std::size_t i = sizeof(Number); i > 0; --i) value = value << 8U | raw[i - 1];
     }
     return static_cast<Number>(value);
+  }
+
+  static double as_f64(std::uint64_t bits) {
+    double value = 0;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
   }
 
   const std::uint8_t* data_;

@@ -1,6 +1,8 @@
 #include "recording/cursor.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -78,9 +80,12 @@ bool Cursor::has(const ChunkPlace& chunk, Topic topic) const {
 }
 
 void Cursor::begin_at(std::size_t chunk) {
+  if (ahead_.valid()) ahead_.get();
   first_chunk_ = chunk_ = chunk;
-  waiting_.clear();
-  decoder_ = {};
+  loaded_ = {};
+  waiting_ = {};
+  front_is_taken_ = false;
+  decoder_ = ValuesDecoder(*edges_);
   counts_ = {};
   transforms_ = {};
   behind_.reset();
@@ -98,11 +103,21 @@ void Cursor::start(Time from) {
     if (!chunks.empty() && checked_time(chunks.front().start) < from) statics_before_ = from;
     return;
   }
+  begin_at(keyframe_before(from));
+}
+
+bool Cursor::skips(Time from) const {
+  if (ahead_.valid()) ahead_.wait();
+  return !foreign_ && keyframe_before(from) > chunk_;
+}
+
+std::size_t Cursor::keyframe_before(Time from) const {
   const auto& chunks = reader_.chunks();
-  for (std::size_t i = 0; i < chunks.size(); ++i) {
-    if (checked_time(chunks[i].start) > from) break;
-    if (has(chunks[i], Topic::kKeyframe)) begin_at(i);
+  std::size_t place = 0;
+  for (std::size_t i = 0; i < chunks.size() && checked_time(chunks[i].start) <= from; ++i) {
+    if (has(chunks[i], Topic::kKeyframe)) place = i;
   }
+  return place;
 }
 
 bool Cursor::is_wanted(const ChunkPlace& chunk, bool statics_only) const {
@@ -122,20 +137,33 @@ void Cursor::note(std::string problem) {
   }
 }
 
-void Cursor::load(const ChunkPlace& chunk) {
+// @return the bytes of its messages
+std::size_t Cursor::load(const ChunkPlace& chunk) {
+  std::size_t bytes = 0;
   const bool statics_only = statics_before_ && checked_time(chunk.end) < *statics_before_;
-  if (!is_wanted(chunk, statics_only)) return;
+  if (!is_wanted(chunk, statics_only)) return bytes;
   auto read = reader_.read(chunk, [&](const Message& message) {
     find_topics();
     add(message, statics_only);
+    bytes += message.data.size();
     return true;
   });
   if (!read) note(read.error().message);
-  if (!foreign_) return;
+  if (!foreign_) return bytes;
   std::stable_sort(
-      waiting_.begin(), waiting_.end(),
+      loaded_.begin(), loaded_.end(),
       [](const RecordedMessage& a, const RecordedMessage& b) { return a.log < b.log; });
   date_transforms();
+  return bytes;
+}
+
+// The last chunk before a keyframe may be small. While it is taken, there would be too little time
+// for the next one.
+void Cursor::load_ahead() {
+  constexpr std::size_t kLeast = std::size_t{1} << 20U;
+  for (std::size_t bytes = 0; bytes < kLeast && chunk_ < reader_.chunks().size();) {
+    bytes += load(reader_.chunks()[chunk_++]);
+  }
 }
 
 // A stamp of 0 was not set: as in the bridge, the value is one of the time of its arrival. If the
@@ -144,27 +172,28 @@ void Cursor::load(const ChunkPlace& chunk) {
 // such sample it goes on from there.
 void Cursor::date_transforms() {
   const auto each_sample = [&](auto visit) {
-    for (auto message = waiting_.rbegin(); message != waiting_.rend(); ++message) {
+    for (auto message = loaded_.end(); message != loaded_.begin();) {
+      --message;
       auto& values = std::get<RecordedValues>(message->what).values;
       for (auto value = values.rbegin(); value != values.rend(); ++value) {
-        if (value->value.stamp && !visit(message->log, *value)) return;
+        if (value->stamp && !visit(message->log, *value)) return;
       }
     }
   };
   each_sample([&](Time log, const RecordedValue& value) {
-    if (!value.dated) behind_ = log - *value.value.stamp;
+    if (!value.dated) behind_ = log - *value.stamp;
     return value.dated;
   });
   auto behind = behind_.value_or(std::chrono::nanoseconds());
   each_sample([&](Time log, RecordedValue& value) {
     if (!value.dated) {
-      behind = log - *value.value.stamp;
+      behind = log - *value.stamp;
       return true;
     }
     const bool other_clock = std::chrono::abs(behind) > kOtherClock;
-    value.value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
+    value.stamp = other_clock ? checked_time(nanoseconds(log) - behind.count()) : log;
     ++counts_.unstamped;
-    note("frame " + quote(value.edge.id) +
+    note("frame " + quote(value.edge->id) +
          ": its messages have no stamp (0): taken as of the time when they were logged");
     return true;
   });
@@ -179,14 +208,14 @@ void Cursor::add(const Message& message, bool statics_only) {
 Result<void> Cursor::decode(Topic topic, const Message& message) {
   const auto take = [&](auto decoded) -> Result<void> {
     if (!decoded) return tl::unexpected(std::move(decoded.error()));
-    waiting_.push_back({log_of(message), *std::move(decoded), false});
+    loaded_.add() = {log_of(message), *std::move(decoded), false};
     return {};
   };
   switch (topic) {
     case Topic::kFrames:
       return take(decode_frames(message.data));
     case Topic::kValues:
-      return take(decoder_.decode(message.data));
+      return decode_values(message);
     case Topic::kJoints:
       return take(decode_joints(message.data));
     case Topic::kEvents:
@@ -201,39 +230,94 @@ Result<void> Cursor::decode(Topic topic, const Message& message) {
   return {};
 }
 
+// Most messages are these, so they reuse the memory of earlier ones.
+Result<void> Cursor::decode_values(const Message& message) {
+  RecordedMessage& recorded = loaded_.add();
+  auto* values = std::get_if<RecordedValues>(&recorded.what);
+  if (values == nullptr) values = &recorded.what.emplace<RecordedValues>();
+  recorded.log = log_of(message);
+  recorded.foreign = false;
+  auto ok = decoder_.decode(message.data, *values);
+  if (!ok) loaded_.drop_last();
+  return ok;
+}
+
 Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
-  auto transforms = decode_tf(message.data);
+  auto transforms = decode_tf(message.data, *edges_);
   if (!transforms) {
     ++counts_.messages;
     return tl::unexpected(std::move(transforms.error()));
   }
   for (RecordedValue& value : transforms->values) {
     if (!is_static) continue;
-    value.value.stamp.reset();
+    value.stamp.reset();
     value.dated = false;
   }
   counts_ += transforms->counts;
   for (std::string& why : transforms->left_out) note(std::move(why));
-  waiting_.push_back({log_of(message),
-                      RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)},
-                      true});
+  loaded_.add() = {log_of(message),
+                   RecordedValues{kForeignPartition, 0, false, std::move(transforms->values)},
+                   true};
   return {};
 }
 
+std::future<void> Cursor::ReadsAhead::begin() {
+  task_ = std::packaged_task<void()>([this] { cursor_.load_ahead(); });
+  auto ended = task_.get_future();
+  job_.ask();
+  return ended;
+}
+
+void Cursor::begin_to_read_ahead() {
+  if (reads_ahead_ == nullptr || foreign_ || chunk_ == reader_.chunks().size()) return;
+  try {
+    ahead_ = reads_ahead_->begin();
+  } catch (const std::system_error&) {  // there are too many threads
+    reads_ahead_ = nullptr;
+  }
+}
+
+void Cursor::end_reading_ahead() {
+  reads_ahead_ = nullptr;
+  if (ahead_.valid()) ahead_.get();
+}
+
+// Puts the messages of the next chunk where they wait. @return whether there is one
+bool Cursor::fetch() {
+  if (ahead_.valid()) {
+    ahead_.get();
+  } else if (loaded_.empty()) {
+    if (chunk_ == reader_.chunks().size()) return false;
+    (void)load(reader_.chunks()[chunk_++]);
+  }
+  waiting_.clear();
+  std::swap(waiting_, loaded_);
+  begin_to_read_ahead();
+  return true;
+}
+
 std::optional<Time> Cursor::peek() {
-  while (waiting_.empty() && chunk_ < reader_.chunks().size()) load(reader_.chunks()[chunk_++]);
+  while (waiting_.empty() && fetch()) {
+  }
   if (waiting_.empty()) return std::nullopt;
   return waiting_.front().log;
 }
 
-std::optional<RecordedMessage> Cursor::next() {
-  if (!peek()) return std::nullopt;
-  RecordedMessage message = std::move(waiting_.front());
-  waiting_.pop_front();
-  if (message.foreign) {
+const RecordedMessage* Cursor::front() {
+  if (!peek()) return nullptr;
+  RecordedMessage& message = waiting_.front();
+  if (message.foreign && !std::exchange(front_is_taken_, true)) {
     transforms_.take(std::get<RecordedValues>(message.what).values, counts_,
                      [this](std::string problem) { note(std::move(problem)); });
   }
+  return &message;
+}
+
+const RecordedMessage* Cursor::next() {
+  const RecordedMessage* message = front();
+  if (message == nullptr) return nullptr;
+  waiting_.pop();
+  front_is_taken_ = false;
   return message;
 }
 

@@ -37,39 +37,39 @@ void ForeignTransforms::take(std::vector<RecordedValue>& values, TransformCounts
 }
 
 bool ForeignTransforms::takes(RecordedValue& value, TransformCounts& counts, const Report& report) {
-  const std::string& id = value.edge.id;
+  const std::string& id = value.edge->id;
   const auto known = edges_.find(id);
-  const bool moves = known == edges_.end() || known->second.parent != value.edge.parent;
-  if (moves && is_below(value.edge.parent, id)) {
+  const bool moves = known == edges_.end() || known->second.parent != value.edge->parent;
+  if (moves && is_below(value.edge->parent, id)) {
     ++counts.cycles;
     report("the transform of frame " + quote(id) + " is left out: its parent " +
-           quote(value.edge.parent) + " is below it");
+           quote(value.edge->parent) + " is below it");
     return false;
   }
   Edge& edge = edges_[id];
-  if (moves) edge = Edge{value.edge.parent};
-  if (value.value.stamp) return takes_sample(value, edge, counts, report);
+  if (moves) edge = Edge{value.edge->parent};
+  if (value.stamp) return takes_sample(value, edge, counts, report);
   // From now on it is static, without the samples from before.
-  if (!edge.is_static) value.value.begins = Covariance();
-  edge = Edge{value.edge.parent};
+  if (!edge.is_static) value.more().begins = Covariance();
+  edge = Edge{value.edge->parent};
   return true;
 }
 
 bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, TransformCounts& counts,
                                      const Report& report) {
-  const auto who = [&] { return "frame " + quote(value.edge.id); };
-  Time& stamp = *value.value.stamp;
+  const auto who = [&] { return "frame " + quote(value.edge->id); };
+  Time& stamp = *value.stamp;
   const Time newest = edge.seen.empty() ? stamp : edge.seen.back().stamp;
   if (newest - stamp > kJumpBack) {
     ++counts.jumps;
     report(who() + ": time has jumped back by more than a second: its samples before are dropped");
     edge = Edge{edge.parent};
-    value.value.begins = Covariance();
+    value.more().begins = Covariance();
   } else if (value.dated) {
     stamp = std::max(stamp, newest);  // while the clock stands still, the last one counts
   }
   edge.is_static = false;
-  const Seen seen{stamp, hash_of(value.value.X_PC.pose)};
+  const Seen seen{stamp, hash_of(value.X_PC.pose)};
   const auto place =
       std::lower_bound(edge.seen.begin(), edge.seen.end(), stamp,
                        [](const Seen& one, Time other) { return one.stamp < other; });

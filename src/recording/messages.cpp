@@ -41,17 +41,16 @@ void put_upper(CdrWriter& writer, const Covariance& covariance) {
   writer.f64s(covariance.upper());
 }
 
-// Nothing if there are no numbers; otherwise they must be 21.
-std::optional<Covariance::Upper> upper_of(CdrReader& reader, bool& valid) {
+// Whether there are numbers; then they must be 21.
+bool read_upper(CdrReader& reader, Covariance::Upper& upper, bool& valid) {
   const std::uint32_t count = reader.count(sizeof(double));
-  if (count == 0) return std::nullopt;
-  Covariance::Upper upper{};
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double number = reader.f64();
-    if (i < upper.size()) upper[i] = number;
+  if (count == upper.size()) {
+    reader.f64s(upper);
+    return true;
   }
-  valid = valid && count == upper.size();
-  return upper;
+  valid = valid && count == 0;
+  for (std::uint32_t i = 0; i < count; ++i) (void)reader.f64();
+  return false;
 }
 
 void put(CdrWriter& writer, const Correlation& correlation) {
@@ -90,15 +89,27 @@ Correlation correlation_of(CdrReader& reader, bool& valid) {
     correlation.observed_with.emplace_back(reader.text());
     valid = valid && check_id(correlation.observed_with.back(), "id");
   }
-  valid = valid && check_common_errors(correlation.common_errors);
+  valid = valid && (errors == 0 || check_common_errors(correlation.common_errors));
   return correlation;
 }
 
-bool is_edge(const WatchedFrame& edge) {
-  return check_id(edge.id, "id") && check_id(edge.parent, "parent") && edge.id != edge.parent;
+bool is_edge(std::string_view id, std::string_view parent) {
+  return check_id(id, "id") && check_id(parent, "parent") && id != parent;
 }
 
 }  // namespace
+
+WatchedValue RecordedValue::watched(std::uint32_t frame) const {
+  WatchedValue value{frame, stamp, X_PC};
+  value.cleared = cleared;
+  value.unsampled = unsampled;
+  if (rest == nullptr) return value;
+  value.correlation = rest->correlation;
+  value.begins = rest->begins;
+  value.kept_before = rest->kept_before;
+  value.drifts = rest->drifts;
+  return value;
+}
 
 ValuesEncoder::ValuesEncoder(std::string& out, std::string_view partition, std::uint64_t commit,
                              bool repeats)
@@ -148,81 +159,94 @@ void ValuesEncoder::put_kept() {
   }
 }
 
-std::optional<RecordedValue> ValuesDecoder::decode_value(CdrReader& reader) {
-  RecordedValue recorded;
-  recorded.edge.id = reader.text();
-  recorded.edge.parent = reader.text();
+const RecordedEdge* ValuesDecoder::decode_edge(CdrReader& reader) {
+  const std::string_view id = reader.text();
+  const std::string_view parent = reader.text();
+  const RecordedEdge* edge = edges_->find(id, parent);
+  if (edge != nullptr || !is_edge(id, parent)) return edge;
+  return edges_->add(id, parent);
+}
+
+std::optional<Covariance::Upper>& ValuesDecoder::last_of(const RecordedEdge& edge) {
+  if (last_.size() <= edge.frame) last_.resize(edge.frame + std::size_t{1});
+  return last_[edge.frame];
+}
+
+bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& value) {
+  value.edge = decode_edge(reader);
   const std::int64_t stamp = reader.i64();
   const auto is = static_cast<CovarianceIs>(reader.u8());
   const auto begins = static_cast<Begins>(reader.u8());
-  Flat flat{};
-  for (std::size_t i = 0; i < 7; ++i) flat[i] = reader.f64();
-  bool valid = is_edge(recorded.edge) && stamp >= kUnsampled && stamp <= kMaxTime;
-  const auto upper = upper_of(reader, valid);
-  const auto noise = upper_of(reader, valid);
-  recorded.value.correlation = correlation_of(reader, valid);
-  if (!reader.good() || !valid) return std::nullopt;
+  std::array<double, 7> pose{};
+  reader.f64s(pose);
+  bool valid = value.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime;
+  Covariance::Upper upper{};
+  Covariance::Upper noise{};
+  const bool given = read_upper(reader, upper, valid);
+  const bool noisy = read_upper(reader, noise, valid);
+  Correlation correlation = correlation_of(reader, valid);
+  if (!reader.good() || !valid) return false;
+  std::optional<Covariance::Upper>& last = last_of(*value.edge);
   if (is == CovarianceIs::kAsBefore) {
-    const auto before = last_.find(recorded.edge.id);
-    if (before == last_.end()) return std::nullopt;
-    std::copy(before->second.upper().begin(), before->second.upper().end(), flat.begin() + 7);
-  } else if (upper) {
-    std::copy(upper->begin(), upper->end(), flat.begin() + 7);
-  } else if (is != CovarianceIs::kUnspecified) {
-    return std::nullopt;
+    if (!last) return false;
+    upper = *last;
+  } else if (!given && is != CovarianceIs::kUnspecified) {
+    return false;
   }
-  auto X_PC = computed_from(flat);
-  if (!X_PC) return std::nullopt;
-  if (is == CovarianceIs::kGiven) last_[recorded.edge.id] = X_PC->covariance.of_specified();
-  recorded.value.X_PC = *X_PC;
-  recorded.value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
-  if (stamp >= 0) recorded.value.stamp = time_of(stamp);
-  recorded.value.cleared = stamp == kCleared;
-  recorded.value.unsampled = stamp == kUnsampled;
-  if (begins == Begins::kNot) return recorded;
-  recorded.value.begins.emplace();
-  recorded.value.drifts = begins == Begins::kDrifting;
-  if (noise) {
-    const auto checked = Covariance::from_upper(*noise);
-    if (!checked) return std::nullopt;
-    recorded.value.begins = *checked;
-  }
-  return recorded;
+  Flat flat{};
+  std::copy(pose.begin(), pose.end(), flat.begin());
+  std::copy(upper.begin(), upper.end(), flat.begin() + pose.size());
+  const auto X_PC = computed_from(flat);
+  if (!X_PC) return false;
+  if (is == CovarianceIs::kGiven) last = upper;
+  value.X_PC = *X_PC;
+  value.X_PC.covariance.set_complete(is != CovarianceIs::kUnspecified);
+  value.stamp = stamp >= 0 ? std::optional(time_of(stamp)) : std::nullopt;
+  value.cleared = stamp == kCleared;
+  value.unsampled = stamp == kUnsampled;
+  value.rest.reset();
+  if (!correlation.empty()) value.more().correlation = std::move(correlation);
+  if (begins == Begins::kNot) return true;
+  value.more().begins.emplace();
+  value.more().drifts = begins == Begins::kDrifting;
+  if (!noisy) return true;
+  const auto checked = Covariance::from_upper(noise);
+  if (checked) value.more().begins = *checked;
+  return checked.has_value();
 }
 
-Result<RecordedValues> ValuesDecoder::decode(std::string_view message) {
+Result<void> ValuesDecoder::decode(std::string_view message, RecordedValues& all) {
   CdrReader reader(message);
-  RecordedValues all;
   all.partition = reader.text();
   all.commit = reader.u64();
   all.repeats = reader.flag();
   const std::uint32_t count = reader.count(kLeastValue);
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("values");
   all.values.reserve(count);
-  std::vector<std::uint32_t> numbers;  // of the values that are valid
+  numbers_.clear();
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (auto value = decode_value(reader)) {
-      all.values.push_back(*std::move(value));
-      numbers.push_back(i);
-    }
+    const std::size_t valid = numbers_.size();
+    RecordedValue& value =
+        valid < all.values.size() ? all.values[valid] : all.values.emplace_back();
+    if (decode_value(reader, value)) numbers_.push_back(i);
     if (!reader.good()) return invalid("values");
   }
-  decode_kept(reader, numbers, all.values);
+  all.values.resize(numbers_.size());
+  decode_kept(reader, all.values);
   if (!reader.good()) return invalid("values");
-  return all;
+  return {};
 }
 
 // Earlier versions did not write this.
-void ValuesDecoder::decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
-                                std::vector<RecordedValue>& values) {
+void ValuesDecoder::decode_kept(CdrReader& reader, std::vector<RecordedValue>& values) const {
   if (reader.left() == 0) return;
   for (std::uint32_t left = reader.count(kLeastKept); left > 0 && reader.good(); --left) {
     const std::uint32_t number = reader.u32();
     const std::int64_t before = reader.i64();
-    const auto found = std::lower_bound(numbers.begin(), numbers.end(), number);
-    if (found == numbers.end() || *found != number || before < 0 || before > kMaxTime) continue;
-    WatchedValue& value = values[static_cast<std::size_t>(found - numbers.begin())].value;
-    if (value.begins) value.kept_before = time_of(before);
+    const auto found = std::lower_bound(numbers_.begin(), numbers_.end(), number);
+    if (found == numbers_.end() || *found != number || before < 0 || before > kMaxTime) continue;
+    RecordedValue& value = values[static_cast<std::size_t>(found - numbers_.begin())];
+    if (value.rest && value.rest->begins) value.rest->kept_before = time_of(before);
   }
 }
 
@@ -257,7 +281,7 @@ Result<RecordedFrames> decode_frames(std::string_view message) {
     WatchedFrame frame;
     frame.id = reader.text();
     frame.parent = reader.text();
-    if (check_id(frame.id, "id") && (frame.parent.empty() || is_edge(frame))) {
+    if (check_id(frame.id, "id") && (frame.parent.empty() || is_edge(frame.id, frame.parent))) {
       all.frames.push_back(std::move(frame));
     }
   }

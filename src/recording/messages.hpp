@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -15,6 +15,7 @@
 #include "tfdude/types/partition_news.hpp"
 
 #include "base/cdr.hpp"
+#include "recording/edge_table.hpp"
 
 // The messages of a recording: to bytes, and from bytes of unknown origin.
 namespace tfdude::recording {
@@ -29,9 +30,29 @@ inline constexpr std::int64_t kMaxTime = 4'000'000'000'000'000'000;
 
 /// A value of an edge.
 struct RecordedValue {
-  WatchedFrame edge;
-  WatchedValue value;  ///< its frame is not used
-  bool dated = false;  ///< of ROS: its stamp was 0, which nobody has set
+  /// What few values have; as of WatchedValue.
+  struct Rest {
+    Correlation correlation;
+    std::optional<Covariance> begins;
+    std::optional<Time> kept_before;
+    bool drifts = false;
+  };
+
+  /// Whether it is a sample, and tells nothing else.
+  [[nodiscard]] bool is_sample() const { return stamp && !cleared && !unsampled && !rest; }
+  [[nodiscard]] Rest& more() {
+    if (rest == nullptr) rest = std::make_unique<Rest>();
+    return *rest;
+  }
+  [[nodiscard]] WatchedValue watched(std::uint32_t frame) const;
+
+  const RecordedEdge* edge = nullptr;  ///< of the table of who has read the message
+  std::optional<Time> stamp;
+  Transform X_PC;
+  bool cleared = false;
+  bool unsampled = false;
+  bool dated = false;          ///< of ROS: its stamp was 0, which nobody has set
+  std::unique_ptr<Rest> rest;  ///< null: nothing of that
 };
 
 struct RecordedValues {
@@ -83,14 +104,24 @@ class ValuesEncoder {
 /// Reads values, in the order of the file from a keyframe or the beginning on.
 class ValuesDecoder {
  public:
+  /// @param edges  gets those of the values, and must outlive them
+  explicit ValuesDecoder(EdgeTable& edges) : edges_(&edges) {}
+
+  /// @param out  replaced, so that its memory can be used again; of no use after an error
   /// @return kState: not a valid message; values that are not valid are left out
-  [[nodiscard]] Result<RecordedValues> decode(std::string_view message);
+  [[nodiscard]] Result<void> decode(std::string_view message, RecordedValues& out);
 
  private:
-  [[nodiscard]] std::optional<RecordedValue> decode_value(CdrReader& reader);
-  static void decode_kept(CdrReader& reader, const std::vector<std::uint32_t>& numbers,
-                          std::vector<RecordedValue>& values);
-  std::unordered_map<std::string, Covariance> last_;  // by frame
+  // @return whether it is valid
+  [[nodiscard]] bool decode_value(CdrReader& reader, RecordedValue& value);
+  // Null: it is not valid.
+  [[nodiscard]] const RecordedEdge* decode_edge(CdrReader& reader);
+  [[nodiscard]] std::optional<Covariance::Upper>& last_of(const RecordedEdge& edge);
+  void decode_kept(CdrReader& reader, std::vector<RecordedValue>& values) const;
+
+  EdgeTable* edges_;
+  std::vector<std::optional<Covariance::Upper>> last_;  // by RecordedEdge::frame
+  std::vector<std::uint32_t> numbers_;  // of the values that are valid, in their message
 };
 
 void encode(const RecordedFrames& frames, std::string& out);
@@ -112,6 +143,7 @@ struct RecordedTransforms {
 };
 
 /// By the rules of the bridge to ROS. @return kState: not a valid message
-[[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message);
+/// @param edges  as of ValuesDecoder
+[[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges);
 
 }  // namespace tfdude::recording

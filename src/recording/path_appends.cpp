@@ -6,13 +6,24 @@ namespace tfdude::recording {
 
 void PathAppends::begin(const State& state) {
   newest_.clear();
+  places_.clear();
   const auto edges = state.forest().edges(a_, b_);
   connected_ = edges.has_value();
   if (!connected_) return;
   for (const FrameInfo& edge : *edges) {
-    const auto history = state.forest().histories(edge.id);
-    newest_[edge.id] = history.empty() ? std::nullopt : history.front().newest;
+    const auto kept = state.forest().kept(edge.id);
+    newest_[edge.id] = kept ? kept->time.stamp : std::nullopt;
   }
+}
+
+std::optional<Time>* PathAppends::newest_of(const RecordedEdge& edge) {
+  if (places_.size() <= edge.number) places_.resize(edge.number + std::size_t{1});
+  Place& place = places_[edge.number];
+  if (!place.known) {
+    const auto found = newest_.find(edge.id);
+    place = {true, found != newest_.end() ? &found->second : nullptr};
+  }
+  return place.newest;
 }
 
 bool PathAppends::only_appends(const State& state, const RecordedMessage& message) {
@@ -27,20 +38,17 @@ bool PathAppends::only_appends(const State& state, const RecordedMessage& messag
   // Values may imply frames.
   if (message.foreign) {
     for (const RecordedValue& one : values->values) {
-      const auto known = state.forest().info(one.edge.id);
-      if (!known || known->parent != one.edge.parent) return false;
+      const auto known = state.forest().info(one.edge->id);
+      if (!known || known->parent != one.edge->parent) return false;
     }
   }
   if (!connected_) return true;
   for (const RecordedValue& one : values->values) {
-    const auto edge = newest_.find(one.edge.id);
-    if (edge == newest_.end()) continue;
-    const WatchedValue& value = one.value;
-    const bool appends = value.stamp && edge->second && *value.stamp > *edge->second &&
-                         !value.begins && !value.cleared && !value.unsampled &&
-                         value.correlation == Correlation();
+    std::optional<Time>* newest = newest_of(*one.edge);
+    if (newest == nullptr) continue;
+    const bool appends = one.is_sample() && *newest && *one.stamp > **newest;
     if (!appends) return false;
-    edge->second = value.stamp;
+    *newest = one.stamp;
   }
   return true;
 }

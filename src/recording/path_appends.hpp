@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <vector>
 
 #include "recording/state.hpp"
 
@@ -22,10 +23,18 @@ class PathAppends {
   [[nodiscard]] bool only_appends(const State& state, const RecordedMessage& message);
 
  private:
+  [[nodiscard]] std::optional<Time>* newest_of(const RecordedEdge& edge);
+
   const std::string a_;
   const std::string b_;
   bool connected_ = false;
   std::unordered_map<std::string, std::optional<Time>> newest_;  // of the edges of the path
+  // Of edges by their numbers; null: the path does not have it.
+  struct Place {
+    bool known = false;
+    std::optional<Time>* newest = nullptr;
+  };
+  std::vector<Place> places_;
 };
 
 }  // namespace tfdude::recording

@@ -2,54 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
-#include "recording/path_appends.hpp"
-#include "recording/state.hpp"
+#include "recording/reading.hpp"
 #include "tree/over_fixed.hpp"
-#include "types/trajectory_builder.hpp"
 
 namespace tfdude {
 namespace {
 
 using namespace recording;
-
-// How much is read before an instant, at first: as much as live histories have.
-constexpr std::chrono::seconds kHistory{10};
-// If that was not enough, so many times more, and in the end all.
-constexpr int kMore = 8;
-constexpr std::chrono::nanoseconds kAll = std::chrono::hours(24 * 365);
-
-// Whether later data may give an answer.
-bool may_come(Errc code) {
-  return code == Errc::kNotYet || code == Errc::kNotConnected || code == Errc::kUnreachable ||
-         is_unknown(code);
-}
-
-// The owners that were not reachable while a lookup read on. If such a process returns, it has the
-// data. Another one knows nothing of the instant, whatever it says holds for all times.
-class Losses {
- public:
-  // @return the error, if an owner was lost and another process has taken its place; or may have,
-  // and then the lookup must read on
-  [[nodiscard]] std::optional<Error> judge(const State& state, const std::optional<Lost>& lost,
-                                           Time now, bool& ends) {
-    const auto is_known = [&](const Lost& one) { return one.partition == lost->partition; };
-    if (lost && std::none_of(lost_.begin(), lost_.end(), is_known)) lost_.push_back(*lost);
-    for (const Lost& one : lost_) {
-      const Returned returned = state.returned(one, now);
-      ends = returned == Returned::kAsOther;
-      if (ends || returned == Returned::kPerhaps) return one.error;
-    }
-    return std::nullopt;
-  }
-
- private:
-  std::vector<Lost> lost_;
-};
 
 // The samples of an edge. Late ones are counted, but do not divide a gap.
 struct Gaps {
@@ -94,131 +57,34 @@ struct Gaps {
   }
 };
 
-Time before(Time at, std::chrono::nanoseconds span) {
-  const std::int64_t ns = nanoseconds(at);
-  return time_of(ns > span.count() ? ns - span.count() : 0);
+// Of all messages; nothing if there are none.
+struct Span {
+  std::optional<Time> first;
+  std::optional<Time> last;
+};
+
+Span span_of(const Cursor& cursor) {
+  Span span;
+  for (const ChunkPlace& chunk : cursor.reader().chunks()) {
+    const Time start = checked_time(chunk.start);
+    const Time end = checked_time(chunk.end);
+    span.first = std::min(span.first.value_or(start), start);
+    span.last = std::max(span.last.value_or(end), end);
+  }
+  return span;
 }
 
 }  // namespace
 
 class Recording::Impl {
  public:
-  explicit Impl(Cursor cursor) : cursor_(std::move(cursor)) {
-    for (const ChunkPlace& chunk : cursor_.reader().chunks()) {
-      const Time start = checked_time(chunk.start);
-      const Time end = checked_time(chunk.end);
-      start_ = std::min(start_.value_or(start), start);
-      end_ = std::max(end_.value_or(end), end);
-    }
-    load(end_.value_or(Time{}), kHistory);
-  }
-
-  void seek(Time at) {
-    if (at < now_) return load(at, kHistory);
-    advance(at);
-  }
-
-  bool step() { return step_message().has_value(); }
-
-  // A state that began too late is read again, from an earlier place.
-  Result<StampedTransform> lookup(std::string_view a, std::string_view b, const Query& query) {
-    while (true) {
-      auto X_AB = state_->lookup(a, b, query);
-      if (X_AB || cursor_.from_beginning() || span_ >= kAll) return X_AB;
-      const bool too_late =
-          X_AB.error().code == Errc::kTooOld || (cursor_.foreign() && may_come(X_AB.error().code));
-      if (!too_late) return X_AB;
-      load(now_, span_ * kMore);
-    }
-  }
-
-  Result<StampedTransform> lookup_at(std::string_view a, std::string_view b, Query query, Time at,
-                                     Milliseconds wait) {
-    query.at = at;
-    seek(at);
-    Losses losses;
-    while (true) {
-      auto X_AB = lookup(a, b, query);
-      bool ends = false;
-      const bool unreachable = !X_AB && X_AB.error().code == Errc::kUnreachable;
-      auto lost =
-          losses.judge(*state_, unreachable ? state_->lost(a, b) : std::nullopt, now_, ends);
-      if (lost) X_AB = tl::unexpected(*std::move(lost));
-      if (X_AB || ends || !may_come(X_AB.error().code)) return X_AB;
-      const auto next = cursor_.peek();
-      if (!next || std::chrono::duration_cast<Milliseconds>(*next - at) > wait || !step()) {
-        return X_AB;
-      }
-    }
-  }
-
-  // Each instant is looked up in the state that lookup_at() would find its answer in, or in one
-  // that differs only by messages that append samples.
-  Trajectory trajectory(std::string_view a, std::string_view b, const std::vector<Time>& instants,
-                        Query query, Milliseconds wait) {
-    constexpr std::size_t kAtOnce = 256;
-    std::vector<std::size_t> order(instants.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t x, std::size_t y) { return instants[x] < instants[y]; });
-    TrajectoryBuilder all(instants.size());
-    if (instants.empty()) return std::move(all).take();
-    seek(instants[order.front()]);
-    PathAppends appends(a, b);
-    appends.begin(*state_);
-    std::size_t done = 0;
-    // Answers what can be answered now, of what was asked before an instant. At the end: all.
-    const auto answer = [&](Time before_this, bool ends = false) {
-      std::optional<std::pair<Handle, Handle>> handles;  // once it is known that all have values
-      for (; done < order.size() && (ends || instants[order[done]] < before_this); ++done) {
-        query.at = instants[order[done]];
-        if (handles && query.order == Order::kSecond) {
-          const auto X_AB = state_->forest().lookup(handles->first, handles->second, query);
-          if (X_AB) {
-            all.add(order[done], X_AB);
-            continue;
-          }
-        }
-        const State* before = state_.get();
-        const auto X_AB = lookup(a, b, query);
-        if (state_.get() != before) appends.begin(*state_);
-        const auto from = state_->forest().find(a);
-        const auto to = state_->forest().find(b);
-        if (X_AB && from && to) handles = {*from, *to};
-        const bool late = now_ - *query.at > wait;
-        if (!X_AB && may_come(X_AB.error().code) && X_AB.error().code != Errc::kUnreachable &&
-            !late && !ends) {
-          return;
-        }
-        all.add(order[done], X_AB);
-      }
-    };
-    answer(now_ + std::chrono::nanoseconds(1));
-    for (std::size_t since = 0; done < order.size(); ++since) {
-      auto message = cursor_.next();
-      if (!message) {
-        answer({}, true);
-        break;
-      }
-      const bool appended = appends.only_appends(*state_, *message);
-      now_ = std::max(now_, message->log);
-      if (!appended || since >= kAtOnce) {
-        // A question at the time of the message comes after it.
-        answer(message->log);
-        since = 0;
-      }
-      state_->apply(*message);
-      if (appended) continue;
-      appends.begin(*state_);
-      answer(message->log);
-    }
-    return std::move(all).take();
-  }
+  explicit Impl(Cursor cursor)
+      : span_(span_of(cursor)), reading_(std::move(cursor), span_.last.value_or(Time{})) {}
 
   [[nodiscard]] std::vector<RecordedNews> next() {
-    while (const auto message = step_message()) {
+    while (const RecordedMessage* message = reading_.step()) {
       std::vector<RecordedNews> all;
-      for (PartitionNews& news : state_->news_of(*message)) {
+      for (PartitionNews& news : reading_.news_of(*message)) {
         all.push_back({message->log, std::move(news)});
       }
       if (!all.empty()) return all;
@@ -230,60 +96,35 @@ class Recording::Impl {
   // place before an instant on, until it returns false. Then restores the instant that is shown.
   template <class Visit>
   void visit(std::optional<Topic> only, Time from, Visit visit) {
-    cursor_.rewind();
-    if (only) cursor_.only(*only);
-    while (auto message = cursor_.next()) {
+    Cursor& cursor = reading_.cursor();
+    cursor.rewind();
+    if (only) cursor.only(*only);
+    while (const RecordedMessage* message = cursor.next()) {
       if (message->log >= from && !visit(*message)) break;
     }
-    cursor_.all_topics();
-    load(now_, span_);
+    cursor.all_topics();
+    reading_.load_again();
   }
 
   void read_all() {
-    cursor_.rewind();
-    while (cursor_.next()) {
+    Cursor& cursor = reading_.cursor();
+    cursor.rewind();
+    while (cursor.next() != nullptr) {
     }
-    counts_ = cursor_.counts();
-    load(now_, span_);
+    counts_ = cursor.counts();
+    reading_.load_again();
   }
 
+  [[nodiscard]] Reading& reading() { return reading_; }
   [[nodiscard]] const std::optional<TransformCounts>& counts() const { return counts_; }
-  [[nodiscard]] const State& state() const { return *state_; }
-  [[nodiscard]] const Cursor& cursor() const { return cursor_; }
-  [[nodiscard]] Time instant() const { return now_; }
-  [[nodiscard]] std::optional<Time> start() const { return start_; }
-  [[nodiscard]] std::optional<Time> end() const { return end_; }
+  [[nodiscard]] const State& state() const { return reading_.state(); }
+  [[nodiscard]] const Cursor& cursor() const { return reading_.cursor(); }
+  [[nodiscard]] std::optional<Time> start() const { return span_.first; }
+  [[nodiscard]] std::optional<Time> end() const { return span_.last; }
 
  private:
-  void load(Time at, std::chrono::nanoseconds span) {
-    span_ = std::min(span, kAll);
-    state_ = std::make_unique<State>();
-    cursor_.start(span_ < kAll ? before(at, span_) : Time{});
-    now_ = at;
-    advance(at);
-  }
-
-  void advance(Time at) {
-    now_ = at;
-    for (auto next = cursor_.peek(); next && *next <= at; next = cursor_.peek()) {
-      state_->apply(*cursor_.next());
-    }
-  }
-
-  std::optional<RecordedMessage> step_message() {
-    auto message = cursor_.next();
-    if (!message) return std::nullopt;
-    now_ = std::max(now_, message->log);
-    state_->apply(*message);
-    return message;
-  }
-
-  Cursor cursor_;
-  std::unique_ptr<State> state_;
-  Time now_{};
-  std::chrono::nanoseconds span_ = kHistory;
-  std::optional<Time> start_;
-  std::optional<Time> end_;
+  const Span span_;
+  Reading reading_;
   std::optional<TransformCounts> counts_;  // if all was read
 };
 
@@ -325,18 +166,18 @@ RecordingSummary Recording::summary() const {
 
 void Recording::read_all() { impl_->read_all(); }
 
-void Recording::seek(Time at) { impl_->seek(at); }
-Time Recording::instant() const { return impl_->instant(); }
-bool Recording::step() { return impl_->step(); }
+void Recording::seek(Time at) { impl_->reading().seek(at); }
+Time Recording::instant() const { return impl_->reading().instant(); }
+bool Recording::step() { return impl_->reading().step() != nullptr; }
 
 Result<StampedTransform> Recording::lookup(std::string_view a, std::string_view b,
                                            const Query& query) {
-  return impl_->lookup(a, b, query);
+  return impl_->reading().lookup(a, b, query);
 }
 
 Result<StampedTransform> Recording::lookup_at(std::string_view a, std::string_view b, Time at,
                                               const Query& query, Milliseconds wait) {
-  return impl_->lookup_at(a, b, query, at, wait);
+  return impl_->reading().lookup_at(a, b, query, at, wait);
 }
 
 Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std::string_view b,
@@ -361,7 +202,7 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std
 Trajectory Recording::trajectory(std::string_view a, std::string_view b,
                                  const std::vector<Time>& instants, const Query& query,
                                  Milliseconds wait) {
-  return impl_->trajectory(a, b, instants, query, wait);
+  return impl_->reading().trajectory(a, b, instants, query, wait);
 }
 
 Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {
@@ -409,9 +250,9 @@ Result<std::vector<HistoryInfo>> Recording::history(const std::string& id) {
     const auto* values = std::get_if<RecordedValues>(&message.what);
     if (values == nullptr || values->repeats) return true;
     for (const RecordedValue& value : values->values) {
-      if (value.edge.id != id) continue;
+      if (value.edge->id != id) continue;
       found = true;
-      if (value.value.stamp) gaps.add(*value.value.stamp);
+      if (value.stamp) gaps.add(*value.stamp);
     }
     return true;
   });

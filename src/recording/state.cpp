@@ -60,6 +60,7 @@ void State::put(Known& known, const WatchedFrame& frame, bool begins) {
   }
   known.frames[frame.id] = frame.parent;
   known.places.clear();
+  settled_.clear();
   share_memory();
   if (before && before->parent == frame.parent && !begins) return;
   if (before) (void)forest_.release(frame.id);
@@ -76,6 +77,7 @@ void State::drop(Known& known, const std::string& id) {
   if (owner == owners_.end() || owner->second != known.info.name) return;
   owners_.erase(owner);
   known.places.clear();
+  settled_.clear();
   known.frames.erase(id);
   valueless_.erase(id);
   (void)forest_.release(id);
@@ -127,37 +129,81 @@ void State::apply(const RecordedFrames& frames, Time log) {
   known.info.frames = known.frames.size();
 }
 
+std::optional<Handle> State::settled(const Known& known, const RecordedEdge& edge) const {
+  const bool is = edge.number < settled_.size() && settled_[edge.number].partition == &known;
+  return is ? std::optional(settled_[edge.number].frame) : std::nullopt;
+}
+
+void State::settle(const Known& known, const RecordedEdge& edge, Handle handle) {
+  if (settled_.size() <= edge.number) settled_.resize(edge.number + std::size_t{1});
+  settled_[edge.number] = {&known, handle};
+}
+
+// Of an edge to which a value comes. None: it is not known here, or the value only repeats what is.
+std::optional<Handle> State::edge_of(Known& known, const RecordedEdge& edge, bool repeats,
+                                     bool foreign) {
+  // One that only repeats is needed if nothing was known.
+  if (repeats && valueless_.count(edge.id) == 0) return std::nullopt;
+  const auto frame = known.frames.find(edge.id);
+  if (frame == known.frames.end() || frame->second != edge.parent) {
+    if (!foreign) return std::nullopt;
+    if (!forest_.exists(edge.parent)) put(known, {edge.parent, ""});
+    put(known, edge);
+    frames_changed_ = true;
+  }
+  return forest_.find(edge.id);
+}
+
 void State::apply(const RecordedValues& recorded, bool foreign) {
   Known& known = partition(recorded.partition);
   if (!recorded.repeats) known.returned.reset();
+  known.info.reachable = known.info.reachable || foreign;
+  if (!take_samples(known, recorded)) take_values(known, recorded, foreign);
+  known.info.frames = known.frames.size();
+}
+
+// Most messages only have samples of edges that are known. @return whether this is one
+bool State::take_samples(const Known& known, const RecordedValues& recorded) {
+  if (recorded.repeats) return false;
+  samples_.clear();
+  for (const RecordedValue& one : recorded.values) {
+    const auto frame = settled(known, *one.edge);
+    if (!frame || !one.is_sample()) return false;
+    samples_.push_back({*frame, nanoseconds(*one.stamp), &one.X_PC});
+  }
+  forest_.take(samples_);
+  return true;
+}
+
+void State::take_values(Known& known, const RecordedValues& recorded, bool foreign) {
   std::vector<Handle> edges;
   std::vector<PushedValue> values;
   for (const RecordedValue& one : recorded.values) {
-    // One that only repeats is needed if nothing was known.
-    if (recorded.repeats && valueless_.count(one.edge.id) == 0) continue;
-    const auto frame = known.frames.find(one.edge.id);
-    if (frame == known.frames.end() || frame->second != one.edge.parent) {
-      if (!foreign) continue;
-      if (!forest_.exists(one.edge.parent)) put(known, {one.edge.parent, ""});
-      put(known, one.edge);
-      frames_changed_ = true;
+    const RecordedEdge& edge = *one.edge;
+    auto frame = settled(known, edge);
+    bool first = false;
+    if (frame && recorded.repeats) continue;
+    if (!frame) {
+      frame = edge_of(known, edge, recorded.repeats, foreign);
+      if (!frame) continue;
+      first = valueless_.erase(edge.id) > 0;
+      settle(known, edge, *frame);
     }
-    const auto handle = forest_.find(one.edge.id);
-    if (!handle) continue;
-    PushedValue value{static_cast<std::uint32_t>(edges.size()), one.value.stamp, one.value.X_PC,
-                      one.value.correlation};
-    value.process_noise = one.value.begins;
-    value.kept_before = one.value.kept_before;
-    value.cleared = one.value.cleared;
-    value.unsampled = one.value.unsampled;
-    value.drifts = one.value.drifts;
-    const bool first = valueless_.erase(one.edge.id) > 0;
+    PushedValue& value = values.emplace_back();
+    value.index = static_cast<std::uint32_t>(edges.size());
+    value.stamp = one.stamp;
+    value.X = one.X_PC;
+    value.cleared = one.cleared;
+    value.unsampled = one.unsampled;
+    if (one.rest) {
+      value.correlation = one.rest->correlation;
+      value.process_noise = one.rest->begins;
+      value.kept_before = one.rest->kept_before;
+      value.drifts = one.rest->drifts;
+    }
     if (first && !value.process_noise) value.process_noise = Covariance();
-    edges.push_back(*handle);
-    values.push_back(std::move(value));
+    edges.push_back(*frame);
   }
-  known.info.reachable = known.info.reachable || foreign;
-  known.info.frames = known.frames.size();
   forest_.take(edges, values);
 }
 
@@ -169,10 +215,9 @@ PartitionNews State::news_of(const RecordedValues& recorded, Known& known) {
   }
   ValuesNews news{recorded.commit, {}};
   for (const RecordedValue& one : recorded.values) {
-    const auto frame = known.frames.find(one.edge.id);
-    if (frame == known.frames.end() || frame->second != one.edge.parent) continue;
-    news.values.push_back(one.value);
-    news.values.back().frame = known.places.at(one.edge.id);
+    const auto frame = known.frames.find(one.edge->id);
+    if (frame == known.frames.end() || frame->second != one.edge->parent) continue;
+    news.values.push_back(one.watched(known.places.at(one.edge->id)));
   }
   return {recorded.partition, std::move(news)};
 }

@@ -81,11 +81,18 @@ class State {
 
   void apply(const RecordedFrames& frames, Time log);
   void apply(const RecordedValues& values, bool foreign);
+  [[nodiscard]] bool take_samples(const Known& known, const RecordedValues& recorded);
+  void take_values(Known& known, const RecordedValues& recorded, bool foreign);
+  [[nodiscard]] std::optional<Handle> edge_of(Known& known, const RecordedEdge& edge, bool repeats,
+                                              bool foreign);
   [[nodiscard]] static PartitionNews news_of(const RecordedValues& recorded, Known& known);
   void put(Known& known, const WatchedFrame& frame, bool begins = false);
   [[nodiscard]] std::optional<Lost> lost(const std::vector<FrameInfo>& edges) const;
   void drop(Known& known, const std::string& id);
   void share_memory();
+  // The frame's handle if the edge is one of the partition, and has a value.
+  [[nodiscard]] std::optional<Handle> settled(const Known& known, const RecordedEdge& edge) const;
+  void settle(const Known& known, const RecordedEdge& edge, Handle handle);
   [[nodiscard]] Known& partition(const std::string& name);
   [[nodiscard]] static FramesNews frames_of(const Known& known);
 
@@ -93,6 +100,13 @@ class State {
   std::map<std::string, Known> partitions_;
   std::unordered_map<std::string, std::string> owners_;  // by frame
   std::unordered_set<std::string> valueless_;            // frames whose edge has no value yet
+  // What is known of edges by their numbers, so that no names are looked up for each value.
+  struct Settled {
+    const Known* partition = nullptr;
+    Handle frame{};
+  };
+  std::vector<Settled> settled_;
+  std::vector<ToldSample> samples_;  // of the message that is applied; kept to reuse its memory
   std::size_t shared_by_ = 0;
   bool frames_changed_ = false;  // by the last message
 };

@@ -34,16 +34,16 @@ std::optional<Fault> fault_of(const WatchedFrame& edge, std::int32_t seconds,
 
 }  // namespace
 
-Result<RecordedTransforms> decode_tf(std::string_view message) {
+Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges) {
   CdrReader reader(message);
   const std::uint32_t count = reader.count(kLeastTransform);
   RecordedTransforms all;
   for (std::uint32_t i = 0; i < count && reader.good(); ++i) {
     const auto seconds = static_cast<std::int32_t>(reader.u32());
     const std::uint32_t nanos = reader.u32();
-    RecordedValue recorded;
-    recorded.edge.parent = ros::without_slashes(reader.text());
-    recorded.edge.id = ros::without_slashes(reader.text());
+    WatchedFrame edge;
+    edge.parent = ros::without_slashes(reader.text());
+    edge.id = ros::without_slashes(reader.text());
     Eigen::Vector3d p;
     for (int n = 0; n < 3; ++n) p[n] = reader.f64();
     Eigen::Quaterniond q;
@@ -53,15 +53,18 @@ Result<RecordedTransforms> decode_tf(std::string_view message) {
     q.w() = reader.f64();
     if (!reader.good()) break;
     const auto pose = ros::pose_of(q, p);
-    if (const auto fault = fault_of(recorded.edge, seconds, pose, all.counts)) {
+    if (const auto fault = fault_of(edge, seconds, pose, all.counts)) {
       ++fault->count;
-      all.left_out.push_back("the transform of frame " + quote(recorded.edge.id.substr(0, kShown)) +
+      all.left_out.push_back("the transform of frame " + quote(edge.id.substr(0, kShown)) +
                              " is left out: " + fault->error.message);
       continue;
     }
-    recorded.value.stamp = time_of(seconds * kSecond + nanos);
-    recorded.dated = recorded.value.stamp == Time();
-    recorded.value.X_PC = {*pose, StatedCovariance::unspecified()};
+    RecordedValue recorded;
+    recorded.edge = edges.find(edge.id, edge.parent);
+    if (recorded.edge == nullptr) recorded.edge = edges.add(edge.id, edge.parent);
+    recorded.stamp = time_of(seconds * kSecond + nanos);
+    recorded.dated = recorded.stamp == Time();
+    recorded.X_PC = {*pose, StatedCovariance::unspecified()};
     all.values.push_back(std::move(recorded));
   }
   if (!reader.good()) {

@@ -383,6 +383,9 @@ class Forest {
   ///   ignored
   void take(const std::vector<Handle>& edges, const std::vector<PushedValue>& values,
             bool replace = true);
+  /// As above, of samples without a correlation, each of the edge that is named: in a fraction of
+  /// the time.
+  void take(const std::vector<ToldSample>& samples);
 
   /// Calls a function after each commit, from the committing thread, which holds the forest's lock.
   /// The function must be quick and must not write to the forest. Null: removes it.

@@ -162,6 +162,8 @@ class Forest::Impl {
       TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const PushedValue& told, bool replace)
       TFDUDE_REQUIRES(mutex_);
+  bool push_told_sample(const HeldVersion& edge, const GivenValue& value, std::int64_t stamp,
+                        bool replace) TFDUDE_REQUIRES(mutex_);
   void take_said(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   void begin_told_history(std::uint32_t slot, const PushedValue& value) TFDUDE_REQUIRES(mutex_);
 

@@ -7,10 +7,12 @@
 namespace tfdude {
 namespace {
 
-bool is_known(const Sample& sample, const PushedValue& told, const Correlation& correlation) {
+bool is_known(const Sample& sample, const GivenValue& told) {
   const SharedRevision* revision = sample.revision();
-  return same(sample.value(), told.X) &&
-         (revision != nullptr ? revision->correlation() : Correlation()) == correlation;
+  const Correlation none;
+  return same(sample.value(), told.X_PC) &&
+         (revision != nullptr ? revision->correlation() : none) ==
+             (told.revision != nullptr ? told.revision->correlation : none);
 }
 
 // Of the edge of the value at i, which begins a history: those that stay together.
@@ -44,25 +46,27 @@ void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& val
 bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& told,
                                     bool replace) {
   const std::int64_t stamp = nanoseconds(*told.stamp);
+  if (!is_of_sample(told)) return push_told_sample(edge, {told.X}, stamp, replace);
+  const SampleRevision revision{told.X, told.correlation};
+  return push_told_sample(edge, {told.X, nullptr, &revision}, stamp, replace);
+}
+
+bool Forest::Impl::push_told_sample(const HeldVersion& edge, const GivenValue& value,
+                                    std::int64_t stamp, bool replace) {
   if (stamp < 0) return false;
-  const bool observed = is_of_sample(told);
-  const SampleRevision revision{told.X, observed ? told.correlation : Correlation()};
-  const GivenValue value{told.X, nullptr, observed ? &revision : nullptr};
+  const std::uint32_t slot = edge.slot;
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);
     if (place < edge.samples->next() && edge.samples->stamp(place) == stamp) {
-      if (!replace || is_known(*edge.samples->sample(place), told, revision.correlation)) {
-        return false;
-      }
+      if (!replace || is_known(*edge.samples->sample(place), value)) return false;
       replace_sample(edge, value, stamp);
-      if (observed) show_revision(edge.slot);
+      if (value.revision != nullptr) show_revision(slot);
       return true;
     }
     if (!check_sample(edge, stamp)) return false;
   }
-  const std::uint32_t slot = edge.slot;
   push_checked(edge, value, stamp);
-  if (observed) show_revision(slot);
+  if (value.revision != nullptr) show_revision(slot);
   return true;
 }
 
@@ -140,6 +144,30 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
         edge->correlation != nullptr ? edge->correlation->said() : Correlation();
     if (before == value->correlation) continue;
     impl_->take_said(edge->slot, value->correlation);
+    changed = true;
+  }
+  if (changed) impl_->commit();
+}
+
+void Forest::take(const std::vector<ToldSample>& samples) {
+  const Writing lock(impl_->mutex_);
+  const auto edge_of = [&](const ToldSample& sample) TFDUDE_UNCHECKED_LOCKS {
+    return static_cast<const HeldVersion*>(impl_->frames_.newest_held(sample.frame));
+  };
+  bool changed = false;
+  bool correlated = false;
+  for (const ToldSample& sample : samples) {
+    const HeldVersion* edge = edge_of(sample);
+    if (edge == nullptr) continue;
+    correlated = correlated || edge->correlation != nullptr;
+    if (!is_finite(*sample.X_PC)) continue;
+    changed = impl_->push_told_sample(*edge, {*sample.X_PC}, sample.stamp, true) || changed;
+  }
+  for (const ToldSample& sample : samples) {
+    const HeldVersion* edge = correlated ? edge_of(sample) : nullptr;
+    if (edge == nullptr || edge->correlation == nullptr) continue;
+    if (edge->correlation->said().empty()) continue;
+    impl_->take_said(edge->slot, {});
     changed = true;
   }
   if (changed) impl_->commit();

@@ -55,6 +55,13 @@ struct PushedValue {
   std::uint64_t continues = 0;
 };
 
+/// A value of an edge that is a sample, and tells nothing else.
+struct ToldSample {
+  Handle frame{};
+  std::int64_t stamp = 0;
+  const Transform* X_PC = nullptr;
+};
+
 /// Puts such reports together: the first value of a history, after an entry that repeats the one
 /// before as if it began again, goes on from that up to the entry's stamp. So it says the same to
 /// those who know nothing of that.

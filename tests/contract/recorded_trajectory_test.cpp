@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -59,7 +60,7 @@ class Writer {
     tell("arm", 1, std::nullopt, ms, true);
   }
   std::string finish() {
-    REQUIRE(writer_.finish(instant(5000)));
+    REQUIRE(writer_.finish(instant(90'000)));
     return file_;
   }
 
@@ -79,6 +80,29 @@ class Writer {
                                 .string();
   RecordingWriter writer_ = RecordingWriter::create(file_, instant(0)).value();
 };
+
+// All instants at once, and one after the other.
+void check_each(const std::string& file, const std::vector<Time>& instants, Milliseconds wait) {
+  auto recording = Recording::open(file);
+  auto single = Recording::open(file);
+  REQUIRE((recording && single));
+  const Trajectory all = recording->trajectory("world", "hand", instants, {}, wait);
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    INFO("wait " << wait.count() << ", instant " << (instants[i] - instant(0)).count());
+    const auto one = single->lookup_at("world", "hand", instants[i], {}, wait);
+    REQUIRE(all.X_AB[i].has_value() == one.has_value());
+    if (one) {
+      CHECK(transform_diff(*all.X_AB[i], *one, 1e-12) == "");
+      continue;
+    }
+    const auto of_it =
+        std::find_if(all.missing.begin(), all.missing.end(), [&](const MissingInstants& missing) {
+          return i >= missing.first && i < missing.first + missing.count;
+        });
+    REQUIRE(of_it != all.missing.end());
+    CHECK(of_it->error.code == one.error().code);
+  }
+}
 
 }  // namespace
 
@@ -118,28 +142,77 @@ TEST_CASE("recorded trajectory: each instant as lookup_at() answers it") {
     const std::string file = writer.finish();
     std::vector<Time> instants;
     for (int i = 0; i < 120; ++i) instants.push_back(instant(static_cast<int>(random.index(4500))));
+    INFO("run " << run);
+    check_each(file, instants, Milliseconds(10'000));
     auto recording = Recording::open(file);
-    auto single = Recording::open(file);
-    REQUIRE((recording && single));
-    const Trajectory all = recording->trajectory("world", "hand", instants);
-    for (std::size_t i = 0; i < instants.size(); ++i) {
-      INFO("run " << run << ", instant " << nanoseconds(instants[i]) / 1'000'000);
-      const auto one = single->lookup_at("world", "hand", instants[i]);
-      REQUIRE(all.X_AB[i].has_value() == one.has_value());
-      if (one) {
-        CHECK(transform_diff(*all.X_AB[i], *one, 1e-12) == "");
-        continue;
-      }
-      const auto of_it =
-          std::find_if(all.missing.begin(), all.missing.end(), [&](const MissingInstants& missing) {
-            return i >= missing.first && i < missing.first + missing.count;
-          });
-      REQUIRE(of_it != all.missing.end());
-      CHECK(of_it->error.code == one.error().code);
-    }
+    REQUIRE(recording);
     CHECK(recording->trajectory("world", "nowhere", {instant(5)}).missing.size() == 1);
     std::filesystem::remove(file);
   }
+}
+
+TEST_CASE("recorded trajectory: what comes after the wait is no answer to what was asked before") {
+  Random random(7120);
+  INFO("seed " << random.seed());
+  Writer writer(random);
+  // The hand pauses from 1 to 2 s, while the base goes on; then both pause until 4 s.
+  for (int ms = 10; ms < 2000; ms += 10) {
+    writer.tell("base", 0, ms, ms + 2);
+    if (ms <= 1000) writer.tell("arm", 1, ms, ms + 5);
+  }
+  writer.tell("arm", 1, 2000, 2005);
+  writer.tell("base", 0, 4000, 4001);
+  writer.tell("arm", 1, 4000, 4002);
+  const std::string file = writer.finish();
+  std::vector<Time> instants;
+  for (int i = 0; i < 60; ++i) instants.push_back(instant(static_cast<int>(random.index(4500))));
+  for (const int wait : {0, 7, 300, 1500, 10'000}) check_each(file, instants, Milliseconds(wait));
+  std::filesystem::remove(file);
+}
+
+TEST_CASE("recorded trajectory: places of the file that nobody asks for are skipped") {
+  Random random(3341);
+  INFO("seed " << random.seed());
+  Writer writer(random);
+  // Some 40 MB in 80 s, and so several places where everything is known.
+  for (int ms = 2; ms < 80'000; ++ms) {
+    writer.tell("base", 0, ms, ms + 1);
+    if (ms % 20 == 0) writer.tell("arm", 1, ms - 10, ms + 1);
+    if (ms % 30'000 == 0) writer.move("mast", ms + 2);
+  }
+  const std::string file = writer.finish();
+  std::vector<Time> instants;
+  for (int i = 0; i < 12; ++i) instants.push_back(instant(static_cast<int>(random.index(80'000))));
+  check_each(file, instants, Milliseconds(10'000));
+  std::sort(instants.begin(), instants.end());
+  check_each(file, instants, Milliseconds(0));
+  // In any order, as a recording that was just opened.
+  auto recording = Recording::open(file);
+  REQUIRE(recording);
+  for (int i = 0; i < 12; ++i) {
+    const Time at = instants[random.index(instants.size())];
+    INFO("instant " << (at - instant(0)).count());
+    const auto X = recording->lookup_at("world", "hand", at);
+    const auto fresh = Recording::open(file).value().lookup_at("world", "hand", at);
+    REQUIRE(X.has_value() == fresh.has_value());
+    if (X) CHECK(transform_diff(*X, *fresh, 1e-12) == "");
+    CHECK(recording->instant() >= at);
+  }
+  // A chunk that is damaged is left out, and named.
+  {
+    std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
+    bytes.seekp(static_cast<std::streamoff>(std::filesystem::file_size(file) / 2));
+    bytes.write("damaged", 7);
+  }
+  instants.clear();
+  for (int ms = 500; ms < 80'000; ms += 2000) instants.push_back(instant(ms));
+  check_each(file, instants, Milliseconds(100));
+  auto damaged = Recording::open(file);
+  REQUIRE(damaged);
+  CHECK(damaged->summary().problems.empty());
+  (void)damaged->trajectory("world", "hand", instants);
+  CHECK(damaged->summary().problems.size() == 1);
+  std::filesystem::remove(file);
 }
 
 }  // namespace tfdude

@@ -56,7 +56,8 @@ struct RecordedNews {
 ///
 /// Recordings of ROS (MCAP files with tf2_msgs/msg/TFMessage) can be asked as well. Their frames
 /// belong to one partition, "ros", and covariances are unspecified.
-/// @par Memory  At most about 1 GB of samples, mostly much less, and one chunk of the file.
+/// @par Memory  At most about 1 GB of samples, mostly much less, and one chunk of the file; two in
+///   trajectory().
 /// @par Thread safety  One thread at a time.
 class TFDUDE_EXPORT Recording {
  public:
@@ -76,8 +77,8 @@ class TFDUDE_EXPORT Recording {
   /// Reads the whole file, so that summary() knows all that is wrong with it, and left out.
   void read_all();
 
-  /// Goes to an instant. From the next earlier place where all values are written once more, the
-  /// file is read up to there: mostly 8 to 16 MB.
+  /// Goes to an instant. From the next earlier place where all values are written once more, or
+  /// from where it is, the file is read up to there: mostly 8 to 16 MB.
   void seek(Time at);
   /// The instant that is shown.
   [[nodiscard]] Time instant() const;

@@ -125,6 +125,7 @@ TEST_CASE("ten minutes at 100 Hz are one message of a recording") {
 
 TEST_CASE("what a value continues is written after the values, where earlier versions stop") {
   const WatchedFrame edge{"robot", "map"};
+  EdgeTable edges;
   std::string with;
   std::string without;
   WatchedValue value{0, at(3), along_x(1), {}, Covariance()};
@@ -141,19 +142,21 @@ TEST_CASE("what a value continues is written after the values, where earlier ver
     encoder.add(edge, WatchedValue{0, at(4), along_x(2)}, false);
     encoder.finish();
   }
-  const auto whole = ValuesDecoder().decode(with);
-  REQUIRE(whole);
-  REQUIRE(whole->values.size() == 2);
-  CHECK(whole->values[0].value.kept_before == at(2));
-  CHECK_FALSE(whole->values[1].value.kept_before);
+  RecordedValues whole;
+  REQUIRE(ValuesDecoder(edges).decode(with, whole));
+  REQUIRE(whole.values.size() == 2);
+  CHECK(whole.values[0].watched(0).kept_before == at(2));
+  CHECK_FALSE(whole.values[1].watched(0).kept_before);
   // As earlier versions have written it.
-  const auto earlier = ValuesDecoder().decode(without);
-  REQUIRE(earlier);
-  REQUIRE(earlier->values.size() == 1);
-  CHECK_FALSE(earlier->values[0].value.kept_before);
+  RecordedValues earlier;
+  REQUIRE(ValuesDecoder(edges).decode(without, earlier));
+  REQUIRE(earlier.values.size() == 1);
+  CHECK_FALSE(earlier.values[0].watched(0).kept_before);
   for (std::size_t size = without.size(); size < with.size(); ++size) {
-    const auto cut = ValuesDecoder().decode(std::string_view(with).substr(0, size));
-    if (cut) CHECK(cut->values.size() <= 2);
+    RecordedValues cut;
+    const bool valid =
+        ValuesDecoder(edges).decode(std::string_view(with).substr(0, size), cut).has_value();
+    if (valid) CHECK(cut.values.size() <= 2);
   }
 }
 
