@@ -59,12 +59,13 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
       spec.X_PC = of_sample ? whole(*known[i]) : known[i]->X_PC;
       if (!of_sample) spec.correlation = replayed(known[i]->correlation);
       edge.correlation = spec.correlation;
-      const bool unsampled = known[i]->unsampled;
+      // Until its sample is applied, a dynamic edge has no value that would hold for all times.
+      const bool moves = of_sample || known[i]->unsampled;
       const Covariance noise = known[i]->begins.value_or(Covariance());
-      if (unsampled || noise.upper() != Covariance::Upper{}) {
+      if (moves || noise.upper() != Covariance::Upper{}) {
         spec.timing = options.history;
         spec.timing->process_noise = noise;
-        spec.timing->moving = unsampled;
+        spec.timing->moving = moves;
       }
     }
     if (!can_serve(spec)) {
