@@ -176,22 +176,24 @@ void Model::may_be_as_in(const Model& earlier, const std::string& partition) {
   allow_removals();
 }
 
-// A frame may be below one again that was removed after it was moved away: it is removed, too, with
-// all below it.
+// A frame may be below one again that was removed, or may have been, after it was moved away: it is
+// removed, too, with all below it.
 void Model::allow_removals() {
   std::vector<std::string> doomed;
   for (const auto& [id, frame] : frames_) {
     const bool orphan = std::any_of(
         frame.possible.begin(), frame.possible.end(),
         [this](const auto& place) { return place && removed_.count(place->parent) > 0; });
-    if (orphan) doomed.push_back(id);
+    if (orphan || (frame.doomed && frame.may_be_gone())) doomed.push_back(id);
   }
   for (const std::string& top : doomed) {
+    const std::set<std::string> removed_by = frames_.at(top).removed_by;
     for (auto& [id, frame] : frames_) {
       const auto ways = ways_up(id, top);
       if (ways.count(top) == 0) continue;
       insert(frame.possible, std::nullopt);
       frame.doomed = true;
+      frame.removed_by.insert(removed_by.begin(), removed_by.end());
       for (const std::string& at : ways) frame.removed_by.insert(frames_.at(at).partition);
     }
   }
