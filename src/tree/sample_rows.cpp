@@ -230,11 +230,12 @@ void share_later(const HeldVersion& edge, std::int64_t t, const Sample& later, R
 // others. Those that were observed after the instant are still looked up, so the last of them is
 // corrected, too.
 std::optional<std::vector<std::string>> tell_later_row(const HeldVersion& edge, std::size_t segment,
-                                                       std::int64_t t, SegmentValues& found) {
+                                                       std::int64_t t, Rows asked,
+                                                       SegmentValues& found) {
   const Sample* later = last_tied(edge);
   if (later == nullptr || later->stamp <= t) return std::nullopt;
   RowOfSample row = as_stored(*later, segment, said_of(edge));
-  share_later(edge, t, *later, row, found);
+  if (asked == Rows::kOfPath) share_later(edge, t, *later, row, found);
   std::vector<std::string> with = row.correlation.observed_with;
   found.rows.push_back(std::move(row));
   return with;
@@ -265,9 +266,7 @@ std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::
                                                   std::int64_t t, Rows asked,
                                                   SegmentValues& found) {
   if (asked == Rows::kNone || t > edge.stamp) return std::nullopt;
-  if (!edge.samples->timing().drifts) {
-    return asked == Rows::kOfPath ? tell_later_row(edge, segment, t, found) : std::nullopt;
-  }
+  if (!edge.samples->timing().drifts) return tell_later_row(edge, segment, t, asked, found);
   const std::vector<const Sample*> rows = rows_of(edge);
   if (rows.empty()) return std::nullopt;
   const Sample& last = *rows.front();

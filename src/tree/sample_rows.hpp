@@ -42,8 +42,7 @@ static_assert(lasting(kMostRows) == kRowLasts * kMostRows);
 /// both, as the walk in between is known (a Brownian bridge). Before the first row only that is
 /// known by how much the edge may have drifted until then, but not how this is correlated with what
 /// was seen since: it counts as of unknown correlation. If it does not drift, its samples err
-/// independently; then only the last one that was observed is a row, and only for earlier instants
-/// on the path.
+/// independently; then only the last one that was observed is a row, and only for earlier instants.
 /// @param segment  of `found`, whose value at the instant was looked up
 /// @return the edges that it was observed with; empty: the value stays, and there are no rows
 [[nodiscard]] std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge,

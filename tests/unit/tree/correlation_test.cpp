@@ -198,6 +198,49 @@ TEST_CASE("A revision of static edges holds until their next update") {
   CHECK(updated->correlations[1].common_errors.size() == 2);
 }
 
+TEST_CASE("The last sample that was observed is a row beside an earlier instant") {
+  Random random(658);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  std::vector<Transform> given;
+  for (int i = 0; i < 4; ++i) {
+    given.push_back(random.transform());
+    REQUIRE(robot.forest.update("a", given.back(), at(10ms * i)));
+  }
+  const Transform X = random.transform();
+  const CommonError observed = common_error(random, "observed:1");
+  REQUIRE(robot.forest.revise({{"a", X, {false, {observed}, {"a", "b"}}}}, at(20ms), UINT64_MAX));
+  const auto asked = [&](std::chrono::microseconds since, Rows rows) {
+    Query query;
+    query.at = Time(1'000'000s + since);
+    return robot.forest.lookup_segments({{"world", "a"}}, query, std::nullopt, true, rows).value();
+  };
+  for (const Rows rows : {Rows::kOfPath, Rows::kAll}) {
+    CHECK(asked(20ms, rows).rows.empty());
+    CHECK(asked(25ms, rows).rows.empty());
+    const SegmentValues before = asked(10ms, rows);
+    REQUIRE(before.rows.size() == 1);
+    CHECK(before.rows[0].stamp == at(20ms));
+    CHECK(transform_diff(before.rows[0].X_PC, X, 1e-12) == "");
+    CHECK(before.rows[0].correlation.common_errors == std::vector<CommonError>{observed});
+    CHECK(transform_diff(before.values[0], given[1], 1e-12) == "");
+  }
+  CHECK(asked(10ms, Rows::kNone).rows.empty());
+  // Between both, a part of the value's error is that of the row, to the last digit.
+  const SegmentValues between = asked(15ms, Rows::kOfPath);
+  const SegmentValues alone = asked(15ms, Rows::kNone);
+  const auto whole = [](const SegmentValues& found) {
+    return collapse(belief_of(found.values[0], found.correlations[0]));
+  };
+  CHECK(covariance_diff(whole(between).covariance.of_specified(),
+                        whole(alone).covariance.of_specified(), 1e-12) == "");
+  REQUIRE(between.rows.size() == 1);
+  CHECK(between.rows[0].X_PC.covariance.of_specified().matrix().isZero(0));
+  const auto& shared_now = between.correlations[0].common_errors;
+  REQUIRE(shared_now.size() == 2);
+  CHECK(shared_now.back().source == between.rows[0].correlation.common_errors.back().source);
+}
+
 TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
   Random random(657);
   INFO("seed " << random.seed());
