@@ -1,0 +1,295 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tfdude/base/id.hpp"
+#include "tfdude/math/interpolate.hpp"
+
+#include "base/saturating.hpp"
+#include "math/finite.hpp"
+#include "tree/forest_impl.hpp"
+#include "tree/sample_rows.hpp"
+
+// What observations make of the values and samples of edges.
+namespace tfdude {
+namespace {
+
+// All revisions of the edge of the first one, by their stamps. One of an instant that comes twice
+// is taken once.
+std::vector<const Revision*> samples_of(const std::vector<Revision>& edges, std::size_t first,
+                                        std::int64_t stamp) {
+  const auto stamp_of = [&](const Revision* one) {
+    return one->stamp ? nanoseconds(*one->stamp) : stamp;
+  };
+  std::vector<const Revision*> all;
+  for (std::size_t i = first; i < edges.size(); ++i) {
+    if (edges[i].id == edges[first].id) all.push_back(&edges[i]);
+  }
+  std::stable_sort(all.begin(), all.end(), [&](const Revision* one, const Revision* other) {
+    return stamp_of(one) < stamp_of(other);
+  });
+  const auto same = [&](const Revision* one, const Revision* other) {
+    return stamp_of(one) == stamp_of(other);
+  };
+  all.erase(std::unique(all.begin(), all.end(), same), all.end());
+  return all;
+}
+
+bool shares_observation(const Correlation& one, const Correlation& other) {
+  const auto has = [&](const std::string& source) {
+    return std::any_of(other.common_errors.begin(), other.common_errors.end(),
+                       [&](const CommonError& error) { return error.source == source; });
+  };
+  return std::any_of(
+      one.common_errors.begin(), one.common_errors.end(),
+      [&](const CommonError& error) { return is_observed(error) && has(error.source); });
+}
+
+}  // namespace
+
+Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revision& revision,
+                                          std::optional<Time> stamp, std::uint64_t seen) {
+  const std::string who = "frame " + quote(revision.id);
+  if (!is_finite(revision.X_PC)) return check_value(revision.id, revision.X_PC);
+  if (auto ok = check_common_errors(revision.correlation.common_errors); !ok)
+    return fail_at(who, ok.error());
+  if (!edge.moving() || (edge.unsampled() && !stamp)) {
+    if (edge.commit <= seen) return {};
+    return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
+  }
+  if (!stamp) return fail(Errc::kChangedMeanwhile, who + " became dynamic since it was observed");
+  // Samples from which the value was computed may be gone.
+  if (edge.history > seen) {
+    return fail(Errc::kChangedMeanwhile, who + " has another history since it was observed");
+  }
+  const std::int64_t at = nanoseconds(*stamp);
+  if (auto ok = check_ahead(edge, at); !ok) return ok;
+  const std::uint64_t place = edge.samples->place_of(at);
+  const bool there = place < edge.samples->next() && edge.samples->stamp(place) == at;
+  // The samples that the value at the instant was computed from.
+  for (const std::uint64_t number : {there ? place : place - 1, place}) {
+    if (number < edge.samples->oldest() || number >= edge.samples->next()) continue;
+    if (edge.samples->sample(number)->commit <= seen) continue;
+    return fail(Errc::kChangedMeanwhile, who + " was written while it was observed");
+  }
+  // Values at all instants are computed from the last one that was observed.
+  const Sample* last = drifts(edge) ? last_observed(edge) : nullptr;
+  if (last != nullptr && last->commit > seen) {
+    return fail(Errc::kChangedMeanwhile, who + " was observed at another instant meanwhile");
+  }
+  if (there) return {};
+  if (!revision.stamp) return check_sample(edge, at);
+  return fail(Errc::kChangedMeanwhile, who + " has lost a sample since it was observed");
+}
+
+void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
+                                 std::int64_t stamp, const RowInfo& row) {
+  SampleRevision fresh{revision.X_PC, revision.correlation, row};
+  if (newest.samples != nullptr && newest.samples->count() > 0) {
+    const SampleHistory& samples = *newest.samples;
+    const std::uint64_t place = samples.place_of(stamp);
+    const Sample* after = place < samples.next() ? samples.sample(place) : nullptr;
+    const Sample* before = place > samples.oldest() ? samples.sample(place - 1) : nullptr;
+    if (after != nullptr && after->stamp == stamp) {
+      fresh.given = given(*after);
+      fresh.row.between = is_between(*after);
+    } else if (after != nullptr && before != nullptr) {
+      const double s = static_cast<double>(stamp - before->stamp) /
+                       static_cast<double>(after->stamp - before->stamp);
+      interpolate(given(*before), given(*after), s, fresh.given);
+      fresh.row.between = true;
+    }
+  }
+  const std::uint32_t slot = newest.slot;
+  const bool carries_on = drifts(newest);
+  replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp);
+  std::uint64_t number = frames_.newest_value(slot).samples->place_of(stamp);
+  while (carries_on && ++number < frames_.newest_value(slot).samples->next()) {
+    const SampleHistory& samples = *frames_.newest_value(slot).samples;
+    const Sample& later = *samples.sample(number);
+    if (later.revision() != nullptr && later.revision()->row.observed) break;
+    const Sample& before = *samples.sample(number - 1);
+    const std::int64_t at = later.stamp;
+    const CorrelatedValue value =
+        drifted(before, nullptr, given(later).pose, samples.timing().process_noise,
+                static_cast<double>(at - before.stamp) * 1e-9);
+    const SampleRevision moved{
+        {given(later).pose, {}}, value.correlation, {false, is_between(later), 0, stamp}};
+    replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
+  }
+  if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
+}
+
+// What an observation has made of the samples from one instant until another is an error of their
+// own. Later ones have a part of it in common with them that no source tells.
+void Forest::Impl::untie_samples(std::uint32_t slot, std::int64_t from, std::int64_t until) {
+  std::uint64_t number = frames_.newest_value(slot).samples->place_of(from);
+  for (;; ++number) {
+    const HeldVersion& edge = frames_.newest_value(slot);
+    if (number >= edge.samples->next() || edge.samples->stamp(number) >= until) return;
+    const Sample& sample = *edge.samples->sample(number);
+    if (!is_correlated(sample)) continue;
+    const std::int64_t at = sample.stamp;
+    const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+    const Transform X = tfdude::whole(sample, said);
+    const SampleRevision alone{given(sample), said != nullptr ? *said : Correlation(),
+                               sample.revision()->row};
+    replace_sample(edge, {X, nullptr, &alone}, at);
+  }
+}
+
+// Rows that the revisions leave out are over: what ties the others to them is lost.
+void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
+                                  std::int64_t stamp) {
+  const auto stamp_of = [&](const Revision& one) {
+    return one.stamp ? nanoseconds(*one.stamp) : stamp;
+  };
+  const HeldVersion& edge = frames_.newest_value(slot);
+  const Sample* last = drifts(edge) && edge.samples->count() > 0 ? last_observed(edge) : nullptr;
+  const std::int64_t until = last != nullptr ? last->stamp : kAlways;
+  std::uint8_t lasts = last != nullptr ? last->revision()->row.lasts : std::uint8_t{0};
+  const bool on_path = std::any_of(revisions.begin(), revisions.end(),
+                                   [](const Revision* one) { return !one->stamp; });
+  if (stamp_of(*revisions.back()) > until) {
+    if (lasts > 0) --lasts;
+  } else if (on_path && stamp < until) {
+    lasts = std::max(lasts, lasting(1 + observed_since(edge, stamp)));
+  }
+  const auto is_tied = [](const Revision& one) {
+    const auto& errors = one.correlation.common_errors;
+    return !one.correlation.unknown && std::any_of(errors.begin(), errors.end(), is_observed);
+  };
+  if (stamp_of(*revisions.front()) > until && last != nullptr &&
+      shares_observation(last->revision()->correlation(), revisions.front()->correlation)) {
+    untie_samples(slot, until, stamp_of(*revisions.front()));
+  }
+  // The latest first: the samples after each row are carried on up to the next one.
+  for (std::size_t i = revisions.size(); i-- > 0;) {
+    const std::int64_t at = stamp_of(*revisions[i]);
+    const bool follows = i > 0 && is_tied(*revisions[i - 1]);
+    const std::int64_t before = follows ? stamp_of(*revisions[i - 1]) : kAlways;
+    revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before});
+  }
+}
+
+void Forest::Impl::show_revision(std::uint32_t slot) {
+  const HeldVersion& newest = frames_.newest_value(slot);
+  const Correlation said =
+      newest.correlation != nullptr ? newest.correlation->said() : Correlation();
+  const SharedRevision* revision = newest.samples->sample(newest.number)->revision();
+  const bool correlated = revision != nullptr && !(revision->correlation().empty() && said.empty());
+  if (!correlated && (newest.correlation == nullptr || !newest.correlation->revised())) return;
+  HeldVersion& shown = push_held(slot, newest.X_PC);
+  if (!correlated) return set_correlation(shown, nullptr);
+  correlate(shown, said, revision->correlation());
+}
+
+// The first value of a history says where the edge begins, with the covariance that is known of it.
+// An edge whose owner has restarted goes on from its stored sample.
+void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& value,
+                                 std::int64_t stamp) {
+  const std::int64_t span = newest.left_behind() ? 0 : newest.samples->timing().span.count();
+  const bool goes_on = newest.moving() && !newest.lacks_sample();
+  if (!goes_on || stamp < saturating_subtract(newest.stamp, span)) {
+    Transform X_PC = value.X_PC;
+    if (!X_PC.covariance.complete()) X_PC.covariance = newest.X_PC.covariance;
+    return push_checked(newest, {X_PC}, stamp);
+  }
+  const std::uint64_t place = newest.samples->place_of(stamp);
+  const bool there = place < newest.samples->next() && newest.samples->stamp(place) == stamp;
+  if (there && is_between(*newest.samples->sample(place))) {
+    return give_between(newest, *newest.samples->sample(place), value.X_PC.pose);
+  }
+  // As if a late value had come in time: what was observed later tells nothing of it. One before
+  // all others leads to the first of them.
+  const bool follows = !there && place > newest.samples->oldest();
+  const Sample& other = *newest.samples->sample(follows ? place - 1 : place);
+  const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
+  const double seconds = std::abs(static_cast<double>(stamp - other.stamp)) * 1e-9;
+  const Pose& G_PC = value.X_PC.pose;
+  CorrelatedValue next =
+      drifted(other, said, G_PC, newest.samples->timing().process_noise, seconds);
+  // Partners that have got another value since are not linked any more.
+  if (newest.correlation != nullptr && newest.correlation->revised()) {
+    next.correlation.observed_with = newest.correlation->now().observed_with;
+  }
+  RowInfo row;
+  if (follows && other.revision() != nullptr) row.follows = other.revision()->row.follows;
+  const SampleRevision revision{{G_PC, {}}, next.correlation, row};
+  const std::uint32_t slot = newest.slot;
+  push_checked(newest, {next.X_PC, nullptr, &revision}, stamp);
+  show_revision(slot);
+}
+
+// What was seen at the stamp stays, and so do the later samples. The way to it and from it is now
+// known.
+void Forest::Impl::give_between(const HeldVersion& newest, const Sample& there, const Pose& G_PC) {
+  const Transform X = there.value();
+  const SharedRevision& before = *there.revision();
+  RowInfo row = before.row;
+  row.between = false;
+  const SampleRevision revision{{G_PC, {}}, before.correlation(), row};
+  const std::uint32_t slot = newest.slot;
+  replace_sample(newest, {X, nullptr, &revision}, there.stamp);
+  show_revision(slot);
+}
+
+void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& value,
+                                  std::int64_t stamp) {
+  const std::uint64_t place = newest.samples->place_of(stamp);
+  if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
+    push_checked(newest, value, stamp);
+    return;
+  }
+  SampleHistory* superseded = newest.samples;
+  const Sample* before = superseded->sample(place);
+  const Sample sample = sample_at(*superseded, place, value, stamp);
+  reclaimer_.samples().release(before->shared);
+  const bool is_newest = newest.stamp == stamp;
+  HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
+  if (is_newest) end_revision(fresh, value.revision);
+  fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
+  fresh.samples->rewritten = fresh.commit;
+  fresh.number = fresh.samples->next() - 1;
+  if (superseded->has_instants(place) || superseded->has_instants(place + 1)) begin_again(fresh);
+  reclaimer_.supersede(superseded);
+}
+
+Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Time> stamp,
+                            std::uint64_t seen) {
+  const Writing lock(impl_->mutex_);
+  std::vector<std::uint32_t> slots;
+  for (const Revision& edge : edges) {
+    const auto slot = impl_->frames_.held_slot(edge.id);
+    if (!slot) return tl::unexpected(slot.error());
+    auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge,
+                                    edge.stamp ? edge.stamp : stamp, seen);
+    if (!ok) return ok;
+    slots.push_back(*slot);
+  }
+  // Values that a later one follows are over. This comes first, as the revisions list each other.
+  for (const std::uint32_t slot : slots) {
+    const HeldVersion& newest = impl_->frames_.newest_value(slot);
+    if (!stamp || !newest.moving() || nanoseconds(*stamp) <= newest.stamp) continue;
+    const bool revised = newest.correlation != nullptr && newest.correlation->revised();
+    if (revised && !Impl::drifts(newest)) impl_->unlink(newest);
+  }
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (std::count(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(i), slots[i]) > 0) {
+      continue;
+    }
+    const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
+    if (newest.moving() && (stamp || edges[i].stamp)) {
+      const std::int64_t at = stamp ? nanoseconds(*stamp) : kAlways;
+      impl_->revise_samples(slots[i], samples_of(edges, i, at), at);
+      continue;
+    }
+    const Correlation said =
+        newest.correlation != nullptr ? newest.correlation->said() : Correlation();
+    HeldVersion& fresh = impl_->push_held(slots[i], edges[i].X_PC);
+    impl_->correlate(fresh, said, edges[i].correlation);
+  }
+  impl_->commit();
+  return {};
+}
+
+}  // namespace tfdude
