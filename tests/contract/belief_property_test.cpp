@@ -300,7 +300,9 @@ class Robot {
     if (!observed) FAIL(observed.error().message);
     poses_.clear();
     filter_.observe(path(a, b, sample), R);
-    compare(a, b, sample, sightings_ == Sightings::kInOrder);
+    if (sightings_ == Sightings::kInOrder || sample == newest_) {
+      compare(a, b, sample, sightings_ == Sightings::kInOrder);
+    }
     ahead_ = true;
   }
 
@@ -373,7 +375,7 @@ TEST_CASE("belief: every pair of frames agrees with a dense joint filter") {
 TEST_CASE("belief: late sightings make no pair of frames more certain than a dense filter") {
   Random random(20261128);
   INFO("seed " << random.seed());
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 150; ++i) {
     INFO("run " << i);
     run(testing::join_loopback(), random, Sightings::kLate, 16);
   }
