@@ -57,6 +57,19 @@ void Absences::teller_restarted(const std::string& teller) {
   }
 }
 
+void Absences::teller_gone(const std::string& teller) {
+  for (auto& [name, missed] : missed_) {
+    const bool open = missed.teller == teller && missed.then == Absent::Kind::kSilent;
+    if (open && missed.relied_on) missed.then = Absent::Kind::kLost;
+  }
+  replace_reports({}, teller);
+}
+
+void Absences::relied_on(const std::string& partition) {
+  const auto there = missed_.find(partition);
+  if (there != missed_.end()) there->second.relied_on = true;
+}
+
 void Absences::heard_of(const std::string& partition, std::uint64_t incarnation) {
   const auto there = missed_.find(partition);
   if (there == missed_.end() || there->second.absent.kind == Absent::Kind::kForgotten) return;

@@ -50,6 +50,11 @@ class Absences {
   /// The teller was restarted, so it cannot say what has become of the silences that it reported:
   /// they count as losses.
   void teller_restarted(const std::string& teller);
+  /// The teller has stopped or is lost. The silences that it reported are over, except those that
+  /// were relied on: they count as losses, so that this participant tells them itself.
+  void teller_gone(const std::string& teller);
+  /// Messages of the missed partition were dropped, as whoever misses it will inform it.
+  void relied_on(const std::string& partition);
   /// A later incarnation of a missed partition was heard of.
   void heard_of(const std::string& partition, std::uint64_t incarnation);
   /// The partition was missed when this process's predecessor ended.
@@ -94,6 +99,7 @@ class Absences {
     std::optional<Steady> noticed;  // of a silence
     std::string teller{};           // of hearsay, which is not passed on
     bool pending = false;           // until it counts as gone
+    bool relied_on = false;         // messages were dropped because of it
     std::chrono::nanoseconds early{};
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,

@@ -30,6 +30,7 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
     partition.successor.reset();
     return false;
   }
+  if (is_told) absences_.relied_on(partition.info.name);
   if (partition.reported != incarnation) {
     partition.reported = incarnation;
     outdated_.push_back(
@@ -57,7 +58,7 @@ void Directory::mark_absent(Known& partition, Owner owner, bool stopped, Time no
   partition.info.stopped = stopped;
   partition.info.since = now;
   absences_.mark_absent(partition.info.name, partition.live, stopped, now, early);
-  absences_.replace_reports({}, partition.info.name);
+  absences_.teller_gone(partition.info.name);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;

@@ -1,5 +1,6 @@
 // Successive processes of one partition, and which of them is accepted.
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -54,13 +55,11 @@ TEST_CASE("messages of an outdated incarnation are reported once") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
-TEST_CASE("an incarnation known only from a lost participant hides no process") {
+TEST_CASE("an incarnation known only from a lost participant hides no process that comes later") {
   Replica head("head");
   Presence base = presence_of("base", 1, 0);
   base.absent = {{"arm", 0, Kind::kSilent, 9}};
   head.directory.apply(base, kNow);
-  head.directory.apply(presence_of("arm", 5, 1), kNow);
-  CHECK_FALSE(head.directory.serving("arm"));
   CHECK(head.directory.lost("base", 1, kNow));
   head.directory.apply(presence_of("arm", 5, 1), kNow);
   head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
@@ -68,21 +67,37 @@ TEST_CASE("an incarnation known only from a lost participant hides no process") 
   CHECK(head.structure() == Lines{"hand <  @ arm"});
 }
 
-TEST_CASE("an incarnation known from a participant that has restarted is told by who heard of it") {
+TEST_CASE("an incarnation known from a participant that is gone is told by who heard of it") {
   Replica head("head");
   Presence base = presence_of("base", 1, 0);
   base.absent = {{"arm", 0, Kind::kSilent, 9}};
   head.directory.apply(base, kNow);
-  // Dropped, since the base says it, too.
+  // Dropped, since the base informs it.
   head.directory.apply(presence_of("arm", 5, 1), kNow);
+  head.directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
   CHECK_FALSE(head.directory.serving("arm"));
-  // The next process of the base has not heard of it.
-  head.directory.apply(presence_of("base", 2, 0), kNow);
+  SECTION("restarted: its next process has not heard of it") {
+    head.directory.apply(presence_of("base", 2, 0), kNow);
+  }
+  SECTION("lost") { REQUIRE(head.directory.lost("base", 1, kNow)); }
+  SECTION("stopped") {
+    base.serving = false;
+    base.stopped = true;
+    base.absent.clear();
+    head.directory.apply(base, kNow);
+  }
   for (auto time = kStart; time < kStart + 2 * Absences::kGrace; time += Absences::kGrace / 4) {
     (void)head.directory.look_for_gone(time);
   }
-  REQUIRE(head.directory.absent().size() == 1);
-  CHECK(head.directory.absent()[0].incarnation == 9);
+  const auto absent = head.directory.absent();
+  const auto told = std::find_if(absent.begin(), absent.end(),
+                                 [](const Absent& one) { return one.partition == "arm"; });
+  REQUIRE(told != absent.end());
+  CHECK(told->incarnation == 9);
+  // Its next messages have a later number, and all pages.
+  head.directory.apply(presence_of("arm", 12, 1), kNow);
+  head.directory.apply(page_of("arm", {{"hand", "", 10}}, 12));
+  CHECK(head.structure() == Lines{"hand <  @ arm"});
 }
 
 TEST_CASE("an absence has the highest incarnation that hides the partition") {
