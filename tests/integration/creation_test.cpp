@@ -82,6 +82,12 @@ Options options_in(const testing::DomainLease& lease) {
   return options;
 }
 
+/// Watched paths hear of changes by messages then, not by the owner's memory.
+Options without_memory(Options options) {
+  options.shared_memory = false;
+  return options;
+}
+
 std::vector<FrameSpec> frames() {
   return {{"map", "", {}},
           {"base", "map", testing::along_x(1)},
@@ -191,7 +197,7 @@ TEST_CASE("creation: an owner that cannot create a writer of replies answers onc
 
 TEST_CASE("creation: a watched path without a reader of values is not healthy, until it has one") {
   const testing::DomainLease lease;
-  const Options options = options_in(lease);
+  const Options options = without_memory(options_in(lease));
   Node node = Node::open("arm", frames(), options).value();
   auto client = Client::open(options).value();
   REQUIRE(testing::eventually([&] { return client.exists("base"); }));
@@ -214,7 +220,7 @@ TEST_CASE("creation: a watched path without a reader of values is not healthy, u
 
 TEST_CASE("creation: a watched partition without a reader of values says so, until it has one") {
   const testing::DomainLease lease;
-  const Options options = options_in(lease);
+  const Options options = without_memory(options_in(lease));
   const Node node = Node::open("arm", frames(), options).value();
   auto client = Client::open(options).value();
   std::mutex mutex;
@@ -244,7 +250,7 @@ TEST_CASE("creation: a watched partition without a reader of values says so, unt
 
 TEST_CASE("creation: an owner that cannot push values ends nevertheless") {
   const testing::DomainLease lease;
-  const Options options = options_in(lease);
+  const Options options = without_memory(options_in(lease));
   auto node = std::make_unique<Node>(Node::open("arm", frames(), options).value());
   auto client = Client::open(options).value();
   REQUIRE(testing::eventually([&] { return client.exists("base"); }));
