@@ -164,7 +164,10 @@ TEST_CASE("stop waits for the calls that are being handled") {
 TEST_CASE("a participant that joins during publishing receives no older page after a newer one") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Server arms(join, "arms");
-  const Repeating publishing([&](std::uint32_t round) { arms.publish(round % 3, round); });
+  const Repeating publishing([&](std::uint32_t round) {
+    arms.publish(round % 3, round);
+    std::this_thread::yield();  // a loop that takes the lock again at once starves joining threads
+  });
   for (int joined = 0; joined < 5; ++joined) {
     testing::Recorder late;
     // Takes its time over the presence, which may come first, while the pages change.
