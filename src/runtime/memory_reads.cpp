@@ -272,13 +272,14 @@ bool MemoryReads::can_watch(const std::vector<Part>& parts) {
 
 std::optional<Reply> MemoryReads::read(const Request& request) {
   const auto* asked = std::get_if<LookupRequest>(&request.body);
-  // Of an observation, and of a velocity, more is needed than what is read.
-  if (asked == nullptr || asked->edges || asked->timed || !any()) return std::nullopt;
+  // Of an observation more is needed than what is read.
+  if (asked == nullptr || asked->rows != Rows::kNone || !any()) return std::nullopt;
   const bool of_age = asked->query.age_noise_until.has_value();
   if (of_age && other_clocks_.load(std::memory_order_relaxed)) return std::nullopt;
   const Forest& forest = structure_.forest;
   const auto look = [&] {
-    return forest.lookup_segments(asked->segments, asked->query, asked->hint, edges_);
+    return forest.lookup_segments(asked->segments, asked->query, asked->hint, edges_, asked->edges,
+                                  asked->timed ? asked->query.at : std::nullopt);
   };
   auto found = look();
   if (!found && found.error().code == Errc::kNotOwner) {

@@ -277,9 +277,14 @@ class Forest {
   [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query,
                                                 const RemoteEdges& others) const;
   /// As lookup_segments(), likewise. Without a period.
+  /// @param motion  the segments are single edges: also which of them are dynamic and which drift,
+  ///   but not what they were observed with
+  /// @param timed_since  the motion since then must be known by stamps, as check_timed() says
   [[nodiscard]] Result<SegmentValues> lookup_segments(const std::vector<PathEnds>& segments,
                                                       const Query& query, std::optional<Time> hint,
-                                                      const RemoteEdges& others) const;
+                                                      const RemoteEdges& others,
+                                                      bool motion = false,
+                                                      std::optional<Time> timed_since = {}) const;
   /// A number that differs from an earlier one if anything of the edges of the path was written
   /// since, or if it has other edges. Empty: an edge is not bound, or cannot be read.
   [[nodiscard]] std::optional<std::uint64_t> written(std::string_view a, std::string_view b,

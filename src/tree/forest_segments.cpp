@@ -255,9 +255,15 @@ std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t 
   return all;
 }
 
-// Adds the edges that each single edge was observed with. A dynamic edge is listed with itself
-// twice: what was observed is its sample, and a later one has another error. One that drifts is
-// listed three times: its later error follows from the earlier one.
+// A dynamic edge is listed with itself twice: what was observed is its sample, and a later one has
+// another error. One that drifts is listed three times: its later error follows from the earlier
+// one.
+template <class Edge>
+std::vector<std::string> marks_of(const Edge& edge, const Name& name) {
+  return {edge.samples().drifts() ? 3U : 2U, std::string(name.text)};
+}
+
+// Adds the edges that each single edge was observed with, after its marks.
 void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues& found) {
   const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
     const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
@@ -268,8 +274,7 @@ void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues
     const HeldVersion* edge = edge_of(edges[i]);
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
-      auto& with = found.correlations[i].observed_with;
-      with.assign(edge->samples->timing().drifts ? 3 : 2, std::string(edge->name->text));
+      found.correlations[i].observed_with = marks_of(OwnEdge{edge}, *edge->name);
       if (!found.stamp) continue;
       const std::int64_t t = nanoseconds(*found.stamp);
       const auto told = tell_rows(*edge, i, t, rows, found);
@@ -282,6 +287,24 @@ void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues
       found.correlations[i].observed_with = edge->correlation->now().observed_with;
     }
   }
+}
+
+// Adds the marks of each single edge. @return false: one cannot be read, or has stamps that its
+// owner has made up since then
+bool tell_motion(const std::vector<Ends>& edges, std::optional<Time> timed_since,
+                 RemoteReading& reading, SegmentValues& found) {
+  found.correlations.resize(edges.size());
+  bool all = true;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    for_each_edge(edges[i], reading, [&](const Version& here, const auto& edge) {
+      all = all && edge.version != nullptr;
+      if (!all || !edge.version->moving() || edge.version->unsampled()) return;
+      found.correlations[i].observed_with = marks_of(edge, *here.name);
+      if (!timed_since || edge.version->lacks_sample()) return;
+      all = edge.samples().is_timed_since(nanoseconds(*timed_since), edge.version->number);
+    });
+  }
+  return all;
 }
 
 template <class From>
@@ -380,7 +403,8 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
-                                              const RemoteEdges& others) const {
+                                              const RemoteEdges& others, bool motion,
+                                              std::optional<Time> timed_since) const {
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());
@@ -390,6 +414,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     auto asked = asked_segments(Others{now}, *ends, query, hint);
     if (!asked) return tl::unexpected(std::move(asked.error()));
     values = *std::move(asked);
+    if (motion && !tell_motion(*ends, timed_since, now, values)) return not_readable();
     return {};
   };
   if (!read_intact(reading, found, read) ||

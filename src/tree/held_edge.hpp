@@ -23,6 +23,9 @@ class OwnSamples {
     return samples_.around(t, newest, back);
   }
   [[nodiscard]] std::int64_t reach(std::uint64_t newest) const { return samples_.reach(newest); }
+  [[nodiscard]] bool is_timed_since(std::int64_t t, std::uint64_t newest) const {
+    return samples_.is_timed_since(t, newest);
+  }
 
   /// Whether the sample is a pose as it was given; then its parts stay in place.
   [[nodiscard]] static bool given_parts(const Sample& sample, TransformParts& parts) {

@@ -167,6 +167,9 @@ class RemoteSamples {
   [[nodiscard]] std::int64_t reach(std::uint64_t newest) const {
     return there() ? extrapolation_reach(*this, newest, samples_->made_up_end()) : 0;
   }
+  [[nodiscard]] bool is_timed_since(std::int64_t t, std::uint64_t newest) const {
+    return there() && timed_since(*this, t, newest, samples_->made_up_end());
+  }
   [[nodiscard]] bool given_parts(const Sample& sample, TransformParts& parts) const;
   /// What samples refer to, copied, since it may change while it is used.
   struct Copies {

@@ -63,9 +63,7 @@ std::uint64_t SampleHistory::layout() {
 }
 
 bool SampleHistory::is_timed_since(std::int64_t t, std::uint64_t newest) const {
-  const std::uint64_t end = made_up_end_.load(std::memory_order_relaxed);
-  if (end <= oldest()) return true;
-  return end <= newest && stamp(end) <= t;
+  return timed_since(*this, t, newest, made_up_end());
 }
 
 Transform SampleHistory::value_between(const Sample& before, const Sample& after,

@@ -340,4 +340,13 @@ std::int64_t extrapolation_reach(const Samples& samples, std::uint64_t newest,
   return interval > INT64_MAX / kMostIntervals ? INT64_MAX : kMostIntervals * interval;
 }
 
+/// As SampleHistory::is_timed_since().
+template <class Samples>
+bool timed_since(const Samples& samples, std::int64_t t, std::uint64_t newest,
+                 std::uint64_t made_up_end) {
+  if (made_up_end <= samples.oldest()) return true;
+  const Sample* first = made_up_end <= newest ? samples.sample(made_up_end) : nullptr;
+  return first != nullptr && first->stamp <= t;
+}
+
 }  // namespace tfdude

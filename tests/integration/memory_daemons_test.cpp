@@ -268,6 +268,62 @@ TEST_CASE("memory: an owner that stops is not taken for a dead one") {
   CHECK(partition(d.memory, "arms").stopped);
 }
 
+TEST_CASE("memory: velocities and lookups of two instants are those over DDS, and ask nobody") {
+  Two d;
+  Random random(15);
+  INFO("seed " << random.seed());
+  REQUIRE(eventually([&] { return all_in_memory(d.memory); }));
+  // Of two owners, and one edge that is on both ways.
+  const std::vector<std::string> moving{"robot_1", "arm_1", "hand_left"};
+  REQUIRE(d.dds.correlate("robot_2", {false, {{"supply", false, random.loading(2, 0.003)}}, {}}));
+  for (int ms = 0; ms < 200; ms += 10) {
+    for (const std::string& id : moving) {
+      REQUIRE(d.dds.update(id, random.transform(1.0, 0.1, 0.01), at_ms(1000 + ms)));
+    }
+  }
+  const auto asks = [&](Client& client, int i) {
+    VelocityQuery query;
+    query.over = std::chrono::milliseconds(20 + i);
+    query.at = at_ms(1050 + 5 * i);
+    return client.velocity("world", "hand_left", query);
+  };
+  const auto asks_two = [&](Client& client, int i) {
+    Query then;
+    Query now;
+    then.at = at_ms(1020 + i);
+    now.at = at_ms(1100 + 3 * i);
+    return client.lookup("hand_left", then, "robot_2", now, "world");
+  };
+  for (int i = 0; i < 20; ++i) {
+    CAPTURE(i);
+    const Velocity found = asks(d.memory, i).value();
+    const Velocity expected = asks(d.dds, i).value();
+    CHECK((found.linear - expected.linear).norm() < 1e-9);
+    CHECK((found.angular - expected.angular).norm() < 1e-9);
+    const Matrix6d sigma = expected.covariance.of_specified().matrix();
+    CHECK((found.covariance.of_specified().matrix() - sigma).norm() <= 1e-7 * sigma.norm());
+    CHECK(found.covariance.complete() == expected.covariance.complete());
+    CHECK(found.basis.sources == expected.basis.sources);
+    CHECK(found.basis.bound == expected.basis.bound);
+    const StampedTransform two = asks_two(d.memory, i).value();
+    const StampedTransform two_expected = asks_two(d.dds, i).value();
+    CHECK(transform_diff(two, two_expected, 1e-9, 1e-7) == "");
+    CHECK(two.basis.bound == two_expected.basis.bound);
+  }
+  // Over DDS there would be no answer: it is not counted as lost before 450 ms.
+  REQUIRE(asks_two(d.memory, 0));
+  REQUIRE(d.memory.velocity("world", "arm_1"));
+  d.arms->freeze();
+  CHECK(asks_two(d.memory, 0));
+  CHECK(d.memory.velocity("world", "arm_1"));
+  d.arms->signal(SIGCONT);
+  REQUIRE(eventually([&] { return d.dds.lookup("world", "arm_1").has_value(); }));
+  // What the owner has made up tells no velocity, and it is the owner who says so.
+  REQUIRE(d.dds.update("hand_left", random.transform()));
+  CHECK(outcome(d.memory.velocity("world", "hand_left")) ==
+        outcome(d.dds.velocity("world", "hand_left")));
+}
+
 TEST_CASE("memory: of a path over an owner that must be asked, the rest is read") {
   testing::TestDomain domain;
   auto robot = domain.start_daemon({"--config", testing::kRobotFile, "--no-shared-memory"});

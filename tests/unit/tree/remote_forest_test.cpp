@@ -110,6 +110,7 @@ class World {
     if (found && found->basis.sources != expected->basis.sources) return what + "other sources";
     if (found && found->basis.bound != expected->basis.bound) return what + "another bound";
     if (auto wrong = look_at_segments(a, b, query); !wrong.empty()) return what + wrong;
+    if (auto wrong = look_at_motion(a, b, query); !wrong.empty()) return what + wrong;
     if (found) ++answered_;
     if (found && found->stamp) ++dynamic_;
     if (found && (found->basis.bound || !found->basis.sources.empty())) ++correlated_;
@@ -120,6 +121,7 @@ class World {
   [[nodiscard]] int dynamic() const { return dynamic_; }
   [[nodiscard]] int correlated() const { return correlated_; }
   [[nodiscard]] int segments() const { return segments_; }
+  [[nodiscard]] int moving() const { return moving_; }
 
  private:
   struct Frame {
@@ -311,6 +313,28 @@ class World {
     return at_one(found->at_hint, expected->at_hint);
   }
 
+  // As a velocity asks for the single edges of a path.
+  std::string look_at_motion(const std::string& a, const std::string& b, const Query& query) {
+    const auto edges = reader_.edges(a, b);
+    if (!edges || edges->empty()) return "";
+    std::vector<PathEnds> asked;
+    for (const FrameInfo& edge : *edges) asked.push_back({edge.parent, edge.id});
+    const auto found = reader_.lookup_segments(asked, query, {}, others_, true, query.at);
+    const auto expected = oracle_.lookup_segments(asked, query, {}, true);
+    if (found.has_value() != expected.has_value()) return "motion: " + outcome(found);
+    if (!found) return "";
+    if (found->correlations.size() != asked.size()) return "motion of some edges only";
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      const PathCorrelation& of = found->correlations[i];
+      const PathCorrelation& right = expected->correlations[i];
+      if (is_moving(asked[i].to, of)) ++moving_;
+      const bool same = is_moving(asked[i].to, of) == is_moving(asked[i].to, right) &&
+                        is_drifting(asked[i].to, of) == is_drifting(asked[i].to, right);
+      if (!same) return "motion of '" + asked[i].to + "'";
+    }
+    return "";
+  }
+
   template <class Value>
   static std::string differs(const Result<Value>& found, const Result<Value>& expected) {
     if (found && !expected) return "an answer where there is " + outcome(expected);
@@ -336,6 +360,7 @@ class World {
   int dynamic_ = 0;
   int correlated_ = 0;
   int segments_ = 0;
+  int moving_ = 0;
 };
 
 }  // namespace
@@ -353,6 +378,7 @@ TEST_CASE("lookups in the memory of others are those of one forest") {
     CHECK(world.dynamic() > 40);
     CHECK(world.correlated() > 40);
     CHECK(world.segments() > 200);
+    CHECK(world.moving() > 100);
   }
 }
 
