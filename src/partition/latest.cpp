@@ -53,8 +53,9 @@ OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> h
   const Time newest = *last->stamp;
   std::chrono::nanoseconds longest{0};
   for (const SegmentValues& answer : answers) longest = std::max(longest, answer.period);
+  const auto oldest = std::min<std::chrono::nanoseconds>(longest, kOldestGuess / 2);
   const bool near =
-      hint && *hint <= newest && *hint >= earlier_by(earlier_by(newest, longest), longest);
+      hint && *hint <= newest && *hint >= earlier_by(earlier_by(newest, oldest), oldest);
   if (near && take_hint(answers, *hint)) return {std::move(answers), std::nullopt};
   return {{}, newest};
 }
@@ -63,7 +64,7 @@ std::optional<Time> LatestHints::guess(std::string_view a, std::string_view b, S
   const std::size_t path = hash_of(a, b);
   const Entry& entry = entries_[path % kEntries];
   if (entry.path != path || !entry.certain) return std::nullopt;
-  return later_by(*entry.certain, now - entry.seen);
+  return std::max(later_by(*entry.certain, now - entry.seen), entry.latest);
 }
 
 void LatestHints::note(std::string_view a, std::string_view b, Steady now,
@@ -75,7 +76,7 @@ void LatestHints::note(std::string_view a, std::string_view b, Steady now,
   const bool known = entry.path == path;
   const bool same = all_of(answers, *last->stamp);
   const int together = same ? (known ? entry.together + 1 : kStreak) : 0;
-  entry = {path, last->stamp, now, std::min(together, kStreak)};
+  entry = {path, last->stamp, *last->stamp, now, std::min(together, kStreak)};
   if (together >= kStreak) {
     entry.certain.reset();
     return;

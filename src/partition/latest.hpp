@@ -16,8 +16,13 @@
 // Each owner answers for its own newest instant and, if it has data, for an instant that the caller
 // predicts. The latest common time T is the oldest of the newest ones. If all answers include T,
 // they are used. Otherwise those at the prediction are used, if all have it and it is at most two
-// periods of the slowest edge older than T. Otherwise all are asked again, for T.
+// periods of the slowest edge, and kOldestGuess, older than T. Otherwise all are asked again, for
+// T.
 namespace tfdude {
+
+/// How much older than the latest common time an answer at a predicted instant may be, so that what
+/// changes now and then is not answered from long ago: two samples at 100 Hz.
+inline constexpr std::chrono::milliseconds kOldestGuess{20};
 
 /// The result of combining the answers of a path's owners.
 struct OneInstant {
@@ -31,7 +36,8 @@ struct OneInstant {
 
 /// Predicts the instant for the next lookup of a path from the last one, assuming samples that keep
 /// their rate. Wherever the two lookups lie between two samples of an owner, its newest one is at
-/// most one period older than predicted. Not thread-safe.
+/// most one period older than predicted. No prediction is before the latest common time that was
+/// seen last: that has all data, and so no lookup goes back behind an earlier one. Not thread-safe.
 class LatestHints {
  public:
   using Steady = std::chrono::steady_clock::time_point;
@@ -47,6 +53,7 @@ class LatestHints {
   struct Entry {
     std::size_t path = 0;         // hash
     std::optional<Time> certain;  // the instant that all have had at most one period later
+    Time latest{};                // the latest common time then
     Steady seen;
     int together = 0;  // consecutive times that all had the same newest instant
   };

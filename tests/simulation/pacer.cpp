@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "faults/frames.hpp"
+#include "partition/latest.hpp"
 
 namespace tfdude::simulation {
 namespace {
@@ -121,7 +122,7 @@ void Pacer::judge(const StampedTransform& X) {
   if (std::abs(seen.y() - seconds_of(at)) > 1e-6 || std::abs(seen.z() - seconds_of(at)) > 1e-6) {
     world.violation("half of another instant",
                     what + " is at " + std::to_string(seen.y()) + ", " + std::to_string(seen.z()));
-  } else if (at > latest || at < latest - 2 * period) {
+  } else if (at > latest || at < latest - std::min<Instant>(2 * period, kOldestGuess)) {
     world.violation("not the latest common time",
                     what + ", which is " + std::to_string(seconds_of(latest)) + " s");
   }

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -70,7 +71,8 @@ TEST_CASE("a guess is one period behind the expected newest sample of the slowes
   const Steady start{};
   CHECK_FALSE(hints.guess("a", "b", start));
   hints.note("a", "b", start, {answer(ms(100), 1), answer(ms(90), 2)});
-  CHECK(hints.guess("a", "b", start) == ms(80));
+  // Not before what all are known to have.
+  CHECK(hints.guess("a", "b", start) == ms(90));
   CHECK(hints.guess("a", "b", start + 25ms) == ms(105));
   CHECK_FALSE(hints.guess("b", "a", start));
   // If all owners repeatedly have the same instant, there is nothing to guess.
@@ -78,11 +80,65 @@ TEST_CASE("a guess is one period behind the expected newest sample of the slowes
   hints.note("c", "d", start, same);
   CHECK_FALSE(hints.guess("c", "d", start));
   hints.note("a", "b", start + 30ms, same);
-  CHECK(hints.guess("a", "b", start + 30ms) == ms(120));
+  CHECK(hints.guess("a", "b", start + 30ms) == ms(130));
+  CHECK(hints.guess("a", "b", start + 50ms) == ms(140));
   for (int i = 0; i < 10; ++i) hints.note("a", "b", start + 30ms, same);
   CHECK_FALSE(hints.guess("a", "b", start + 30ms));
   hints.note("a", "b", start + 30ms, {answer(ms(130), 1), answer(ms(120), 2)});
-  CHECK(hints.guess("a", "b", start + 30ms) == ms(110));
+  CHECK(hints.guess("a", "b", start + 30ms) == ms(120));
+  CHECK(hints.guess("a", "b", start + 45ms) == ms(125));
+}
+
+TEST_CASE("a guess is used only if it is recent, however slow the samples are") {
+  const auto ask = [](Time hint) {
+    SegmentValues slow = answer(ms(9000), 1, 11);
+    slow.period = 10s;
+    return one_instant({std::move(slow), answer(ms(9500), 2, 12)}, hint);
+  };
+  CHECK(ask(ms(8980)).answers.size() == 2);
+  CHECK(ask(ms(8979)).ask_again == ms(9000));
+}
+
+TEST_CASE("no lookup goes back behind an earlier one, or far behind what all have") {
+  testing::Random random(2718);
+  INFO("seed " << random.seed());
+  for (int run = 0; run < 200; ++run) {
+    LatestHints hints;
+    // Two owners whose samples come at any time, with stamps that are in order.
+    std::int64_t now = 1'000'000'000'000;
+    std::int64_t newest[2] = {now, now};
+    std::int64_t period[2] = {0, 0};
+    std::int64_t seen = 0;
+    const std::size_t gap = random.index(3) == 0 ? 2'000'000'000 : 20'000'000;
+    for (int i = 0; i < 200; ++i) {
+      now += static_cast<std::int64_t>(random.index(gap));
+      for (const std::size_t one : {0U, 1U}) {
+        if (random.index(3) != 0) continue;
+        const std::int64_t stamp = now - static_cast<std::int64_t>(random.index(1000));
+        if (stamp <= newest[one]) continue;
+        period[one] = stamp - std::exchange(newest[one], stamp);
+      }
+      const Steady steady{std::chrono::nanoseconds(now)};
+      const auto hint = hints.guess("a", "b", steady);
+      std::vector<SegmentValues> answers;
+      for (const std::size_t one : {0U, 1U}) {
+        SegmentValues values{
+            {{along_x(1)}}, time_of(newest[one]), std::chrono::nanoseconds(period[one]), {}};
+        if (hint && nanoseconds(*hint) <= newest[one]) values.at_hint.values.push_back(along_x(1));
+        answers.push_back(std::move(values));
+      }
+      hints.note("a", "b", steady, answers);
+      const std::int64_t latest = std::min(newest[0], newest[1]);
+      const auto found = one_instant(std::move(answers), hint);
+      const std::int64_t answered =
+          found.ask_again ? nanoseconds(*found.ask_again) : nanoseconds(*found.answers[0].stamp);
+      CAPTURE(run, i);
+      REQUIRE(answered <= latest);
+      REQUIRE(answered >= latest - 20'000'000);
+      REQUIRE(answered >= seen);
+      seen = answered;
+    }
+  }
 }
 
 TEST_CASE("one round trip is enough if samples arrive at constant rates") {
