@@ -20,8 +20,8 @@ std::string host_name() {
 }
 
 // Stamps may be those of a simulation. The import notices itself when time jumps back.
-EdgeTiming timing_of_frames(const Settings& settings) {
-  EdgeTiming timing = settings.options.history;
+EdgeTiming timing_of_frames() {
+  EdgeTiming timing;
   timing.max_ahead = std::chrono::nanoseconds::max();
   return timing;
 }
@@ -34,8 +34,8 @@ bool is_marked(const PartitionInfo& partition, const BridgeMark& mark) {
 }  // namespace
 
 Result<std::unique_ptr<Bridge>> Bridge::open(const Settings& settings) {
-  Options options = settings.options;
-  options.history = timing_of_frames(settings);
+  NodeOptions options = settings.options;
+  options.history = timing_of_frames();
   auto node = Node::open(settings.partition, {}, options);
   if (!node) return tl::unexpected(std::move(node.error()));
   std::unique_ptr<Bridge> bridge(new Bridge(*std::move(node)));
@@ -71,7 +71,7 @@ Result<void> Bridge::start(const Settings& settings) {
   ros_ = *std::move(ros);
   const bool takes_others = !settings.values_in.empty() || !settings.detections_in.empty();
   if (settings.frames_in || takes_others) {
-    frames_in_.emplace(node_, import_of(settings), timing_of_frames(settings));
+    frames_in_.emplace(node_, import_of(settings), timing_of_frames());
   }
   if (settings.frames_out) frames_out_.emplace(node_, *settings.frames_out);
   if (settings.description_out) {

@@ -61,8 +61,7 @@ bool asks_for_zero(const Common& common) {
 
 // Of a source that knows only some frames, another one that knows all.
 Result<Client> open_for_all(const Common& common) {
-  Options options = common.options;
-  options.follow.reset();
+  const Options& options = common.options;
   return Client::open(options);
 }
 

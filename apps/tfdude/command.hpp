@@ -16,7 +16,7 @@ namespace tfdude::cli {
 
 /// The options that all commands have.
 struct Common {
-  Options options;
+  ClientOptions options;
   bool json = false;
   AngleUnit angles = kRadian;  ///< of angles that are typed, and of printed text
   char** argv = nullptr;       ///< the command line as it was typed
@@ -36,8 +36,8 @@ struct Command {
 };
 
 /// Instead of an exit status, before anything was printed: all owners are of an earlier version,
-/// and do not know the request for single frames (Options::follow). So the command must be repeated
-/// by a client that receives all frames.
+/// and do not know the request for single frames (ClientOptions::follow). So the command must be
+/// repeated by a client that receives all frames.
 inline constexpr int kNeedsAllFrames = -1;
 
 /// A command that asks or changes the live system.

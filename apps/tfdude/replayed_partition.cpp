@@ -45,7 +45,7 @@ std::vector<const WatchedValue*> by_frame(std::size_t frames, const ValuesNews& 
 
 Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const FramesNews& frames,
                                                   const ValuesNews& values,
-                                                  const Options& options) {
+                                                  const NodeOptions& options) {
   std::vector<FrameSpec> specs;
   std::size_t rejected = 0;
   std::unordered_map<std::string, Edge> served;

@@ -19,7 +19,7 @@ class ReplayedPartition {
   [[nodiscard]] static Result<ReplayedPartition> open(const std::string& name,
                                                       const FramesNews& frames,
                                                       const ValuesNews& values,
-                                                      const Options& options);
+                                                      const NodeOptions& options);
 
   /// New frames and parents are served together with the values that follow, or after settle().
   void apply(const FramesNews& frames);

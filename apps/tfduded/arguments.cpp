@@ -162,7 +162,7 @@ std::optional<int> read_arguments(int argc, char** argv, Arguments& arguments) {
   app.add_option("--max-history", limits.history_bytes, "memory of all histories [bytes]")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMost));
-  app.add_option("--max-others", limits.others,
+  app.add_option("--max-others", arguments.options.others,
                  "frames, joints and removals of other partitions that are kept here")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMost));

@@ -20,7 +20,7 @@ struct Arguments {
   bool check = false;         ///< only print what the configuration would change
   bool drop_damaged = false;  ///< leave out stored rows whose checksum is wrong
   std::optional<ClockKind> clock;
-  Options options;
+  NodeOptions options;
 };
 
 /// Prints help and errors of usage itself.

@@ -137,7 +137,7 @@ std::string unspecified_edges(const Config& config) {
 }
 
 int check(const Arguments& arguments, const Config& config) {
-  const Options& options = arguments.options;
+  const NodeOptions& options = arguments.options;
   const auto preview = preview_config(config.partition, config.frames, options);
   if (!preview) {
     spdlog::error("partition {}: {}", quote(config.partition), preview.error().message);

@@ -99,7 +99,7 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
     }
     for (const std::string& row : *dropped) spdlog::warn("left out of the stored state: {}", row);
   }
-  tfdude::Options options = arguments.options;
+  tfdude::NodeOptions options = arguments.options;
   options.history = config->history;
   options.clock = config->clock.value_or(tfdude::ClockKind::kSystem);
   // One of several would be taken for the whole.

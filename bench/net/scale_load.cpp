@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
   int calls = 0;
   int timeout_ms = 0;
   std::vector<std::string> follow;
-  tfdude::Options options;
+  tfdude::ClientOptions options;
   options.shared_memory = false;  // as in harness.cpp
   CLI::App app{"calls for one daemon"};
   app.add_option("mode", mode)->required()->check(CLI::IsMember({"add", "lookup", "idle"}));

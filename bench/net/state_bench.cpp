@@ -30,7 +30,7 @@ struct Side {
   Side(tfdude::Options options, const std::string& state)
       : asker(must(Client::open(options), "join")), owner(open(std::move(options), state)) {}
 
-  static Node open(tfdude::Options options, const std::string& state) {
+  static Node open(tfdude::NodeOptions options, const std::string& state) {
     options.state = state;
     options.save_every = tfdude::Milliseconds(20);
     std::vector<tfdude::FrameSpec> frames{{"f0", "", {}}};

@@ -17,10 +17,12 @@
 namespace tfdude::python {
 namespace {
 
-std::shared_ptr<Session> open_client(const OpenArguments& arguments) {
+std::shared_ptr<Session> open_client(const OpenArguments& arguments,
+                                     std::optional<std::vector<std::string>> follow) {
   check_usable();
   note_use();
-  const Options options = to_options(arguments);
+  ClientOptions options = to_options(arguments);
+  options.follow = std::move(follow);
   LoopbackNetwork* const network = arguments.network;
   auto client = without_gil([&] {
     return network != nullptr ? Client::open(network->join(), options) : Client::open(options);
@@ -30,8 +32,10 @@ std::shared_ptr<Session> open_client(const OpenArguments& arguments) {
 }
 
 void bind_opening(py::class_<Session, std::shared_ptr<Session>>& cls) {
-  cls.def(py::init([](TFDUDE_OPEN_PARAMETERS) { return open_client(TFDUDE_OPEN_VALUES); }),
-          py::kw_only(), TFDUDE_OPEN_ARGUMENTS);
+  cls.def(py::init([](std::optional<std::vector<std::string>> follow, TFDUDE_OPEN_PARAMETERS) {
+            return open_client(TFDUDE_OPEN_VALUES, std::move(follow));
+          }),
+          py::kw_only(), py::arg("follow") = py::none(), TFDUDE_OPEN_ARGUMENTS);
   cls.def("close", &Session::close,
           "Leaves the domain. Afterwards each call raises TransformException.");
   cls.def_property_readonly("closed", &Session::closed);
@@ -178,7 +182,6 @@ Options to_options(const OpenArguments& arguments) {
   if (!arguments.discovery.is_none()) {
     options.discovery = to_milliseconds(arguments.discovery, "discovery");
   }
-  options.follow = arguments.follow;
   // The environment may have switched it off.
   options.shared_memory = options.shared_memory && arguments.shared_memory;
   if (arguments.clock == "external") {

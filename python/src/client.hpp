@@ -27,29 +27,24 @@ struct OpenArguments {
   std::optional<std::string> keys;
   py::object timeout;
   py::object discovery;
-  std::optional<std::vector<std::string>> follow;
   std::string clock;
   bool shared_memory;
   LoopbackNetwork* network;
 };
 
 // The same parameters for both, as pybind11 needs them: the function's, their values and names.
-#define TFDUDE_OPEN_PARAMETERS                                                                  \
-  std::optional<std::uint32_t> domain, std::optional<std::string> profile,                      \
-      std::optional<std::string> discovery_server, std::optional<std::string> keys,             \
-      py::object timeout, py::object discovery, std::optional<std::vector<std::string>> follow, \
-      std::string clock, bool shared_memory, LoopbackNetwork *network
-#define TFDUDE_OPEN_VALUES                                                                     \
-  {                                                                                            \
-    domain, profile, discovery_server, keys, timeout, discovery, follow, clock, shared_memory, \
-        network                                                                                \
-  }
-#define TFDUDE_OPEN_ARGUMENTS                                                                   \
-  py::arg("domain") = py::none(), py::arg("profile") = py::none(),                              \
-  py::arg("discovery_server") = py::none(), py::arg("keys") = py::none(),                       \
-  py::arg("timeout") = py::none(), py::arg("discovery") = py::none(),                           \
-  py::arg("follow") = py::none(), py::arg("clock") = "system", py::arg("shared_memory") = true, \
-  py::arg("network") = py::none()
+#define TFDUDE_OPEN_PARAMETERS                                                         \
+  std::optional<std::uint32_t> domain, std::optional<std::string> profile,             \
+      std::optional<std::string> discovery_server, std::optional<std::string> keys,    \
+      py::object timeout, py::object discovery, std::string clock, bool shared_memory, \
+      LoopbackNetwork *network
+#define TFDUDE_OPEN_VALUES \
+  { domain, profile, discovery_server, keys, timeout, discovery, clock, shared_memory, network }
+#define TFDUDE_OPEN_ARGUMENTS                                                                      \
+  py::arg("domain") = py::none(), py::arg("profile") = py::none(),                                 \
+  py::arg("discovery_server") = py::none(), py::arg("keys") = py::none(),                          \
+  py::arg("timeout") = py::none(), py::arg("discovery") = py::none(), py::arg("clock") = "system", \
+  py::arg("shared_memory") = true, py::arg("network") = py::none()
 
 [[nodiscard]] Options to_options(const OpenArguments& arguments);
 

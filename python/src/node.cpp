@@ -14,7 +14,7 @@ std::shared_ptr<NodeSession> open_node(const std::string& partition,
                                        const OpenArguments& arguments) {
   check_usable();
   note_use();
-  Options options = to_options(arguments);
+  NodeOptions options = to_options(arguments);
   options.state = state;
   options.sync = sync;
   LoopbackNetwork* const network = arguments.network;
@@ -35,7 +35,7 @@ void bind_node(py::module_& module) {
       "partition: its name; nobody else may serve it. frames: FrameSpec, in any order; parents\n"
       "may belong to others. state: directory in which the partition is stored; '': nothing is. "
       "sync:\n"
-      "each change waits for the disk. The other parameters are those of Client.")
+      "each change waits for the disk. The other parameters are those of Client, without follow.")
       .def(py::init([](const std::string& partition, const std::vector<FrameSpec>& frames,
                        const std::string& state, bool sync, TFDUDE_OPEN_PARAMETERS) {
              return open_node(partition, frames, state, sync, TFDUDE_OPEN_VALUES);

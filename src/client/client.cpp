@@ -44,7 +44,7 @@ Result<JointUpdate> joint_update(const std::vector<std::string>& names,
   return update;
 }
 
-Result<void> check_follow(const Options& options) {
+Result<void> check_follow(const ClientOptions& options) {
   if (!options.follow) return {};
   for (const std::string& one : *options.follow) {
     if (auto ok = check_id(one, "follow"); !ok) return ok;
@@ -61,7 +61,7 @@ Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;
 
-Result<Client> Client::open(const Options& options) {
+Result<Client> Client::open(const ClientOptions& options) {
   if (auto ok = check_follow(options); !ok) return tl::unexpected(std::move(ok.error()));
   auto transport = make_fastdds_transport(
       {options.domain, options.profile, {}, nullptr, options.discovery_server, options.keys});
@@ -69,7 +69,7 @@ Result<Client> Client::open(const Options& options) {
   return open(*std::move(transport), options);
 }
 
-Result<Client> Client::open(TransportPtr transport, const Options& options) {
+Result<Client> Client::open(TransportPtr transport, const ClientOptions& options) {
   if (auto ok = check_follow(options); !ok) return tl::unexpected(std::move(ok.error()));
   auto participant = std::make_unique<Participant>(std::move(transport), std::string(), options);
   if (auto started = participant->start(); !started)

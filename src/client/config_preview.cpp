@@ -12,7 +12,8 @@
 namespace tfdude {
 
 Result<ConfigPreview> preview_config(const std::string& partition,
-                                     const std::vector<FrameSpec>& frames, const Options& options) {
+                                     const std::vector<FrameSpec>& frames,
+                                     const NodeOptions& options) {
   if (auto ok = check_new_partition_name(partition); !ok)
     return tl::unexpected(std::move(ok.error()));
   ConfigPreview preview;

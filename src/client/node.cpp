@@ -6,19 +6,11 @@
 #include "runtime/participant.hpp"
 
 namespace tfdude {
-namespace {
-
-Result<void> check(const std::string& partition, const Options& options) {
-  if (!options.follow) return check_new_partition_name(partition);
-  return fail(Errc::kInvalidInput,
-              "follow: partition " + quote(partition) + " needs all frames, not only some");
-}
-
-}  // namespace
-
 Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpec>& frames,
-                        const Options& options) {
-  if (auto ok = check(partition, options); !ok) return tl::unexpected(std::move(ok.error()));
+                        const NodeOptions& options) {
+  if (auto ok = check_new_partition_name(partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
   auto transport = make_fastdds_transport({options.domain, options.profile, partition, nullptr,
                                            options.discovery_server, options.keys});
   if (!transport) return tl::unexpected(std::move(transport.error()));
@@ -26,8 +18,10 @@ Result<Node> Node::open(const std::string& partition, const std::vector<FrameSpe
 }
 
 Result<Node> Node::open(TransportPtr transport, const std::string& partition,
-                        const std::vector<FrameSpec>& frames, const Options& options) {
-  if (auto ok = check(partition, options); !ok) return tl::unexpected(std::move(ok.error()));
+                        const std::vector<FrameSpec>& frames, const NodeOptions& options) {
+  if (auto ok = check_new_partition_name(partition); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
   auto participant = std::make_unique<Participant>(std::move(transport), partition, options);
   if (auto started = participant->start(); !started)
     return tl::unexpected(std::move(started.error()));

@@ -5,7 +5,7 @@
 namespace tfdude {
 
 Result<std::vector<std::string>> drop_damaged_state(const std::string& partition,
-                                                    const Options& options) {
+                                                    const NodeOptions& options) {
   if (options.state.empty()) return std::vector<std::string>();
   return drop_wrong_rows(state_file(options.state, options.domain, partition), partition);
 }

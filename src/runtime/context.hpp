@@ -1,5 +1,9 @@
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "tfdude/types/options.hpp"
 
 #include "base/loop.hpp"
@@ -22,9 +26,21 @@ struct Threads {
   Callbacks callbacks{calls};
 };
 
+/// Those of a Client, or of a Node, which follows all frames.
+struct ParticipantOptions : NodeOptions {
+  // NOLINTBEGIN(google-explicit-constructor): each of them says all
+  ParticipantOptions(const Options& common) : NodeOptions(common) {}
+  ParticipantOptions(const NodeOptions& node) : NodeOptions(node) {}
+  ParticipantOptions(const ClientOptions& client)
+      : NodeOptions(static_cast<const Options&>(client)), follow(client.follow) {}
+  // NOLINTEND(google-explicit-constructor)
+
+  std::optional<std::vector<std::string>> follow{};  ///< as of ClientOptions
+};
+
 /// What the parts of a participant need of it. All of it outlives them.
 struct Context {
-  const Options& options;
+  const ParticipantOptions& options;
   Structure& structure;
   Transport& transport;
   Discovery& discovery;

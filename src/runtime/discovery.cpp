@@ -131,7 +131,7 @@ Error Discovery::undecided(const std::string& what, const TimeLimit& limit) {
     if (const std::string* partition = structure_.directory.incomplete()) {
       missing = "partition " + quote(*partition) +
                 (structure_.directory.is_cut(*partition)
-                     ? " has more frames than are kept here of others (Options::limits.others)"
+                     ? " has more frames than are kept here of others (Options::others)"
                      : " has not sent all of its frames yet");
     } else if (const std::string* late = structure_.directory.behind()) {
       missing = "partition " + quote(*late) + " has made a change that has not arrived here yet";

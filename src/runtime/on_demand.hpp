@@ -15,9 +15,10 @@
 
 namespace tfdude {
 
-/// Asks owners for the frames that this participant needs, and does not keep (Options::follow).
-/// Each owner knows all frames, so any of them may answer; but one that has started after another
-/// was lost does not know the frames of that. So what is missing is asked of all.
+/// Asks owners for the frames that this participant needs, and does not keep
+/// (ClientOptions::follow). Each owner knows all frames, so any of them may answer; but one that
+/// has started after another was lost does not know the frames of that. So what is missing is asked
+/// of all.
 /// @par Thread safety  All functions are thread-safe, for callers that hold no lock.
 class OnDemand {
  public:
@@ -30,7 +31,7 @@ class OnDemand {
     std::function<void()> on_routes;
   };
 
-  /// @param follow  as Options::follow
+  /// @param follow  as ClientOptions::follow
   OnDemand(Structure& structure, Discovery& discovery, std::vector<std::string> follow,
            Links links);
 

@@ -15,7 +15,8 @@ double seconds_of(Time time) { return static_cast<double>(nanoseconds(time)) * 1
 
 }  // namespace
 
-Participant::Participant(TransportPtr transport, std::string partition, const Options& options)
+Participant::Participant(TransportPtr transport, std::string partition,
+                         const ParticipantOptions& options)
     : options_(options),
       process_memory_(ProcessMemory::open(options.shared_memory, !partition.empty())),
       structure_(options.clock, partition, process_memory_.arena),
@@ -44,7 +45,7 @@ Participant::Participant(TransportPtr transport, std::string partition, const Op
       advances_(context_),
       streams_(context_) {
   const Lock lock(structure_.mutex);
-  structure_.directory.limit_others(options_.limits.others);
+  structure_.directory.limit_others(options_.others);
   if (!wants_pages()) structure_.directory.do_without_pages();
 }
 

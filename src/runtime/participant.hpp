@@ -44,7 +44,7 @@ class Participant final : public TransportHandler,
                           private OwnPartition {
  public:
   /// @param partition  the partition to own; empty: none
-  Participant(TransportPtr transport, std::string partition, const Options& options);
+  Participant(TransportPtr transport, std::string partition, const ParticipantOptions& options);
   ~Participant() override;
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
@@ -149,7 +149,7 @@ class Participant final : public TransportHandler,
   [[nodiscard]] std::optional<Reply> answer_query(const Request& request,
                                                   const std::optional<PeerId>& from);
 
-  const Options options_;
+  const ParticipantOptions options_;
   ProcessMemory process_memory_;
   Structure structure_;
   TransportPtr transport_;

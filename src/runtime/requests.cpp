@@ -34,7 +34,7 @@ Result<void> Requests::know(const std::vector<std::string>& ids, Milliseconds ma
 Result<void> Requests::check_keeps_all(const std::string& what) const {
   if (on_demand_ == nullptr) return {};
   return fail(Errc::kInvalidInput,
-              "a client that follows only some frames (Options::follow) cannot " + what);
+              "a client that follows only some frames (ClientOptions::follow) cannot " + what);
 }
 
 Error Requests::last_word(Error error, const TimeLimit& limit) {

@@ -45,7 +45,7 @@ class Requests final : public RequestLink {
 
   /// For a participant that does not keep all frames.
   struct Follow {
-    std::vector<std::string> trees;   ///< as Options::follow
+    std::vector<std::string> trees;   ///< as ClientOptions::follow
     std::function<void()> on_routes;  ///< as OnDemand::Links
   };
 

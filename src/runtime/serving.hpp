@@ -37,7 +37,7 @@ class Serving {
   Discovery& discovery_;
   Transport& transport_;
   MemberRunner& member_;
-  const Options& options_;
+  const ParticipantOptions& options_;
 };
 
 }  // namespace tfdude

@@ -71,7 +71,7 @@ TEST_CASE("bounds: a client keeps no more of the structure of others than its li
   const auto store = Node::open(join("store"), "store", frames).value();
   const auto robot = Node::open(join("robot"), "robot", {{"tool", "", {}}}).value();
   Options options;
-  options.limits.others = 2000;
+  options.others = 2000;
   auto client = Client::open(join(""), options).value();
   CHECK(client.exists("tool"));
   const auto X = client.lookup("tool", "absent");

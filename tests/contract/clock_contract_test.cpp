@@ -3,6 +3,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
@@ -37,6 +38,11 @@ Options external(Milliseconds timeout = Milliseconds(1000)) {
   Options options;
   options.clock = ClockKind::kExternal;
   options.timeout = timeout;
+  return options;
+}
+
+NodeOptions dynamic(Options common) {
+  NodeOptions options = std::move(common);
   options.history.moving = true;
   return options;
 }
@@ -55,11 +61,12 @@ std::optional<ClockKind> clock_of(Client& client, const std::string& partition) 
 // publisher of the time, which uses the system's clock.
 struct Simulation {
   explicit Simulation(const Join& join) {
-    base.emplace(
-        Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}}, external())
-            .value());
+    base.emplace(Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}},
+                            dynamic(external()))
+                     .value());
     tool.emplace(
-        Node::open(join("tool"), "tool", {{"hand", "arm", along_x(1)}}, external()).value());
+        Node::open(join("tool"), "tool", {{"hand", "arm", along_x(1)}}, dynamic(external()))
+            .value());
     client.emplace(Client::open(join(""), external()).value());
     publisher.emplace(Client::open(join("")).value());
   }
@@ -82,7 +89,7 @@ struct Simulation {
 TEST_CASE("clock: before the first time, whatever needs the present fails and says so") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node base = Node::open(join("base"), "base", {{"world", "", {}}, {"arm", "world", {}}},
-                         external(Milliseconds(300)))
+                         dynamic(external(Milliseconds(300))))
                   .value();
   Client client = Client::open(join(""), external(Milliseconds(300))).value();
   for (Client* caller : {static_cast<Client*>(&base), &client}) {
@@ -159,7 +166,8 @@ TEST_CASE("clock: a participant that starts later has the next time") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Simulation sim(join);
   sim.tell(ms(5000));
-  Node late = Node::open(join("late"), "late", {{"camera", "hand", {}}}, external()).value();
+  Node late =
+      Node::open(join("late"), "late", {{"camera", "hand", {}}}, dynamic(external())).value();
   // The time stands still, and is published again.
   CHECK(eventually([&] {
     REQUIRE(sim.publisher->publish_clock(ms(5000)));
@@ -173,7 +181,7 @@ TEST_CASE("clock: a joint has the position of its newest sample after a jump bac
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   FrameSpec arm{"arm", "world", {}};
   arm.joint = testing::revolute_named("shoulder");
-  Node node = Node::open(join("arm"), "arm", {{"world", "", {}}, arm}, external()).value();
+  Node node = Node::open(join("arm"), "arm", {{"world", "", {}}, arm}, dynamic(external())).value();
   REQUIRE(node.set_time(ms(9000)));
   REQUIRE(node.update_joints({"shoulder"}, {0.5}, {0}, ms(9000)));
   REQUIRE(node.set_time(ms(0)));
@@ -188,7 +196,8 @@ TEST_CASE("clock: a joint has the position of its newest sample after a jump bac
 TEST_CASE("clock: each participant says which clock it uses") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node sim =
-      Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, external()).value();
+      Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, dynamic(external()))
+          .value();
   Node real = Node::open(join("real"), "real", {{"hand", "arm", along_x(1)}}).value();
   Client client = Client::open(join("")).value();
   for (Client* caller : {static_cast<Client*>(&sim), static_cast<Client*>(&real), &client}) {
@@ -206,7 +215,8 @@ TEST_CASE("clock: each participant says which clock it uses") {
 TEST_CASE("clock: the present of one clock is not taken for that of another") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   Node sim =
-      Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, external()).value();
+      Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, dynamic(external()))
+          .value();
   Client client = Client::open(join("")).value();
   REQUIRE(sim.set_time(ms(5000)));
   for (const int t : {4000, 5000}) REQUIRE(sim.update("arm", along_x(t), ms(t)));

@@ -19,7 +19,7 @@ using testing::joined_by;
 using testing::outcome;
 
 Node serving(const Join& join, const std::string& description) {
-  Options options;
+  NodeOptions options;
   options.description = description;
   return Node::open(join("arm"), "arm", {{"base", "", {}}}, options).value();
 }

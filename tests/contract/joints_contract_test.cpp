@@ -396,7 +396,7 @@ TEST_CASE("joints: a new client reaches all owners at once and names an unknown 
 TEST_CASE("joints: a node that is reopened has its stored joint positions") {
   const Join join = joined_by(GENERATE(from_range(testing::networks())));
   const testing::TemporaryDirectory directory;
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   const std::vector<FrameSpec> frames{{"world", "", {}},
                                       moved_by("turret", "world", revolute_named("turn"))};

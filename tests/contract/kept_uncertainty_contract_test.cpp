@@ -63,7 +63,7 @@ class Kept {
     return spec;
   }
   void start(const std::string& name, const std::vector<FrameSpec>& frames) {
-    Options options;
+    NodeOptions options;
     options.state = directory_.path();
     auto node = Node::open(join_(name), name, frames, options);
     INFO((node ? "" : node.error().message));

@@ -39,7 +39,7 @@ struct Robot {
         base(random.transform(1.0, 0.01, 0.01)),
         arm(random.transform(1.0, 0.01, 0.01)),
         hand(unspecified(random.pose())) {
-    Options options;
+    NodeOptions options;
     options.state = state;
     robot.emplace(Node::open(join("robot"), "robot",
                              {{"world", "", {}}, {"odom", "world", odom}, {"base", "odom", base}},
@@ -198,7 +198,7 @@ TEST_CASE("unspecified: a restarted owner still says so") {
   Robot robot(join, random, directory.path());
   REQUIRE(robot.client->update("arm", unspecified(robot.arm.pose)));
   robot.arms.reset();
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   auto again = Node::open(join("arms"), "arms",
                           {{"arm", "base", robot.arm}, {"hand", "arm", robot.hand}}, options);

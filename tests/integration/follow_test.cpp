@@ -45,7 +45,7 @@ struct Robot {
     arm.emplace(domain.serve(arm_config));
   }
   [[nodiscard]] Client follower(const std::vector<std::string>& follow) const {
-    Options options = domain.options();
+    ClientOptions options = domain.options();
     options.follow = follow;
     return Client::open(options).value();
   }
@@ -92,7 +92,7 @@ TEST_CASE("follow: the command line also finds frames if all owners are of an ea
   const Node base = earlier(domain.options(), "base", {{"world", "", {}}});
   const Node arm = earlier(domain.options(), "arm", {{"hand", "world", along_x(11)}});
 
-  Options options = domain.options();
+  ClientOptions options = domain.options();
   options.follow.emplace();
   auto client = Client::open(options);
   REQUIRE(client);

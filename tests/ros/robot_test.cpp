@@ -191,7 +191,7 @@ TEST_CASE("ros robot: a description of 400 kB reaches a late node") {
 TEST_CASE("ros robot: the description that a daemon serves reaches ROS, and its next one") {
   const RosRig rig;
   const auto serving = [&](const std::string& description) {
-    Options options = rig.dude().options();
+    NodeOptions options = rig.dude().options();
     options.description = description;
     return Node::open("arm", {{"base", "", {}}}, options).value();
   };

@@ -59,7 +59,7 @@ class Rig : private OwnPartition {
     member.on_lost(partition, incarnation, {});
   }
 
-  const Options options;
+  const ParticipantOptions options;
   std::function<void()> on_contest;
   std::function<void(const PushedValues&)> pushed;
   std::function<Result<void>()> owns_partition;  // else the member's

@@ -39,7 +39,7 @@ void DescriptionIn::take(const std::string& text) {
   node_.reset();
   text_.clear();
   leave_root_to_tf(*frames);
-  Options options = options_;
+  NodeOptions options = options_;
   options.description = text;
   auto node = Node::open(settings_.partition, *frames, options);
   if (!node) {

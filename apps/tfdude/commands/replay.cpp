@@ -277,7 +277,7 @@ class Replay {
 
   Recording& recording_;
   Client& clock_;
-  Options options_;
+  NodeOptions options_;
   const bool loop_;
   const Time start_;
   const Time end_;

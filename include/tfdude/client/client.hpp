@@ -43,7 +43,7 @@ class Participant;
 /// A process's access to all frames of a domain. See Node for a process that owns frames.
 ///
 /// Each process has a replica of the structure. So missing frames are known without a request, and
-/// requests go straight to the owners. With Options::follow it has no replica, see there.
+/// requests go straight to the owners. With ClientOptions::follow it has no replica, see there.
 ///
 /// @par Thread safety  All functions may be called from any thread. Each waits for its own answer
 ///   only.
@@ -62,10 +62,11 @@ class TFDUDE_EXPORT Client {
  public:
   /// Joins a domain over DDS. Waits for no other participant; takes some milliseconds.
   /// @return kConfig (profile), kTransport, kInvalidInput (domain).
-  [[nodiscard]] static Result<Client> open(const Options& options = {});
+  [[nodiscard]] static Result<Client> open(const ClientOptions& options = {});
 
   /// Joins over any transport. Returns immediately.
-  [[nodiscard]] static Result<Client> open(TransportPtr transport, const Options& options = {});
+  [[nodiscard]] static Result<Client> open(TransportPtr transport,
+                                           const ClientOptions& options = {});
 
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
@@ -200,8 +201,8 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<std::vector<JointInfo>> joints(const std::string& partition,
                                                       Milliseconds wait = {});
 
-  /// The robot description (URDF) of a partition, Options::description of its Node; empty: it has
-  /// none. One round trip per 32 KiB.
+  /// The robot description (URDF) of a partition, NodeOptions::description of its Node; empty: it
+  /// has none. One round trip per 32 KiB.
   /// @return kUnknownPartition; kUnsupported (an owner of protocol 1.0).
   [[nodiscard]] Result<std::string> description(const std::string& partition);
 
@@ -225,9 +226,10 @@ class TFDUDE_EXPORT Client {
   ///
   /// A path of own edges of a Node uses no network, no lock and no allocation. Other paths take one
   /// round trip, however many partitions they cross, or two if the partitions have no common
-  /// instant near the predicted one. An answer at a predicted instant may be older
-  /// than the latest common time, by up to two samples of the slowest edge. A handle is valid
-  /// for this client only; other clients treat it as an unknown frame.
+  /// instant near the predicted one. An answer at a predicted instant may be older than the latest
+  /// common time: by up to two samples of the slowest edge, and 20 ms. It is never older than an
+  /// earlier answer. A handle is valid for this client only; other clients treat it as an unknown
+  /// frame.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (all edges have no instant
   ///   in common).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);

@@ -25,6 +25,6 @@ struct ConfigPreview {
 /// @return kState (naming the file), the error of the first invalid frame, as Node::open().
 ///   Thread-safe.
 [[nodiscard]] TFDUDE_EXPORT Result<ConfigPreview> preview_config(
-    const std::string& partition, const std::vector<FrameSpec>& frames, const Options& options);
+    const std::string& partition, const std::vector<FrameSpec>& frames, const NodeOptions& options);
 
 }  // namespace tfdude

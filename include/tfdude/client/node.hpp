@@ -23,10 +23,10 @@ class TFDUDE_EXPORT Node : public Client {
   /// and serves them. The frames may be in any order, and parents may be missing or belong to
   /// others.
   ///
-  /// With Options::state, the state that an earlier process left is loaded first. The given frames
-  /// are compared with those given to the last process that got any. Only new and changed frames
-  /// are applied. Frames that are no longer given are removed, but frames below them stay and wait
-  /// for them. An empty list changes nothing.
+  /// With NodeOptions::state, the state that an earlier process left is loaded first. The given
+  /// frames are compared with those given to the last process that got any. Only new and changed
+  /// frames are applied. Frames that are no longer given are removed, but frames below them stay
+  /// and wait for them. An empty list changes nothing.
   ///
   /// Usually takes 0.4 s; at most 5 s plus Options::discovery, if a predecessor still seems to be
   /// running.
@@ -38,12 +38,12 @@ class TFDUDE_EXPORT Node : public Client {
   ///   first invalid frame, errors of Client::open().
   [[nodiscard]] static Result<Node> open(const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
-                                         const Options& options = {});
+                                         const NodeOptions& options = {});
 
   /// Joins over any transport.
   [[nodiscard]] static Result<Node> open(TransportPtr transport, const std::string& partition,
                                          const std::vector<FrameSpec>& frames = {},
-                                         const Options& options = {});
+                                         const NodeOptions& options = {});
 
   [[nodiscard]] const std::string& partition() const;
   /// The number of frames of the partition.

@@ -15,6 +15,6 @@ namespace tfdude {
 /// @return what was erased, such as "frames 'hand'"; kState (naming the file) if it is in use, or
 ///   damaged in another way. Thread-safe.
 [[nodiscard]] TFDUDE_EXPORT Result<std::vector<std::string>> drop_damaged_state(
-    const std::string& partition, const Options& options);
+    const std::string& partition, const NodeOptions& options);
 
 }  // namespace tfdude

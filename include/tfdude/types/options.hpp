@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tfdude/base/export.hpp"
@@ -29,8 +30,8 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 /// False if the environment's TFDUDE_SHARED_MEMORY is "off".
 [[nodiscard]] TFDUDE_EXPORT bool shared_memory_of_environment();
 
-/// How much others can make a participant keep. What would exceed it is rejected with kTooMuch,
-/// except samples.
+/// How much others can make a Node keep. What would exceed it is rejected with kTooMuch, except
+/// samples.
 struct PartitionLimits {
   std::size_t frames = 200'000;  ///< that the partition owns
   /// Groups of watchers. Those that watch the same edges of the partition in the same way are one.
@@ -38,13 +39,10 @@ struct PartitionLimits {
   /// Of the samples of all its edges. The oldest ones are dropped for new ones, and counted
   /// (Node::refused()); the two newest of each edge stay.
   std::size_t history_bytes = std::size_t{256} << 20U;
-  /// Of the structure of all other partitions: their frames, joints and latest removals. What is
-  /// beyond is not kept, and its partitions stay incomplete here. Also for a Client.
-  std::size_t others = 2'000'000;
 };
 
-/// How a participant joins a domain. Participants discover each other only in the same domain and
-/// with the same profile.
+/// How a participant joins a domain, a Client or a Node. Participants discover each other only in
+/// the same domain and with the same profile.
 struct Options {
   /// DDS domain, 0 to 232.
   std::uint32_t domain = domain_of_environment();
@@ -62,11 +60,38 @@ struct Options {
   /// not announced its structure, calls fail with kTimeout, for up to three times Options::timeout
   /// more.
   Milliseconds discovery{1000};
+  /// The clock of stamps: of unstamped updates of a Node's dynamic edges, of the check how far a
+  /// stamp is ahead, and of Client::now(). Liveness and time limits always use a steady clock, and
+  /// events, logs and conflicts between partitions the system's clock. An external clock gets its
+  /// time from Client::publish_clock() of any participant of the domain, or from
+  /// Client::set_time(). All participants of a domain should have the same kind.
+  ClockKind clock = ClockKind::kSystem;
+  /// How many frames, joints and latest removals of all other partitions are kept. What is beyond
+  /// is not, and its partitions stay incomplete here.
+  std::size_t others = 2'000'000;
+  /// Maximum time that the destructor of a client waits until the values it has streamed (publish,
+  /// publish_joints) are acknowledged, as flush() does; at most `timeout`.
+  Milliseconds linger{100};
+  /// Whether lookups read frames of other processes of this computer in the memory of those, and
+  /// those read a Node's frames in its memory (docs/memory.md). Where that is not possible, owners
+  /// are asked over DDS.
+  bool shared_memory = shared_memory_of_environment();
+};
+
+struct NodeOptions;
+
+/// How a Client joins a domain.
+struct ClientOptions : Options {
+  ClientOptions() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): what all participants have is enough
+  ClientOptions(Options common) : Options(std::move(common)) {}
+  ClientOptions(const NodeOptions&) = delete;
+
   /// What a client follows, instead of all frames. Absent: it receives the structure of all
   /// partitions, and keeps it. Otherwise it has no replica, and keeps only the frames that it
   /// follows or has been asked about, each with all frames above it. An entry is the id of a frame,
   /// for it and all frames below it; or the beginning of ids, followed by '*'. No entries: it only
-  /// asks. Not for a Node, which needs all frames.
+  /// asks.
   ///
   /// Such a client asks an owner, which has a replica, for frames, and keeps the answers. So
   /// the first call about a frame takes one more round trip. If a call fails with a kept answer, it
@@ -78,6 +103,15 @@ struct Options {
   /// may also fail with kUnsupported (all owners are of an earlier version) or kNotPermitted
   /// (keys).
   std::optional<std::vector<std::string>> follow{};
+};
+
+/// How a Node joins a domain, and how it keeps and serves its partition.
+struct NodeOptions : Options {
+  NodeOptions() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): what all participants have is enough
+  NodeOptions(Options common) : Options(std::move(common)) {}
+  NodeOptions(const ClientOptions&) = delete;
+
   /// Directory in which a Node stores its partition's frames, from which its next process restores
   /// them; empty: nothing is stored. Changes requested by others are stored before they are
   /// acknowledged.
@@ -91,24 +125,10 @@ struct Options {
   Milliseconds save_every{1000};
   /// Default timing and history of a Node's edges, for frames without their own.
   EdgeTiming history{};
-  /// The clock of stamps: of unstamped updates of a Node's dynamic edges, of the check how far a
-  /// stamp is ahead, and of Client::now(). Liveness and time limits always use a steady clock, and
-  /// events, logs and conflicts between partitions the system's clock. An external clock gets its
-  /// time from Client::publish_clock() of any participant of the domain, or from
-  /// Client::set_time(). All participants of a domain should have the same kind.
-  ClockKind clock = ClockKind::kSystem;
   /// The robot description (URDF) of a Node's partition, which others can ask for. It is only
   /// passed on: the frames are those given to Node::open().
   std::string description;
-  /// Limits of a Node, and `others` of a Client.
   PartitionLimits limits{};
-  /// Maximum time that the destructor of a client waits until the values it has streamed (publish,
-  /// publish_joints) are acknowledged, as flush() does; at most `timeout`.
-  Milliseconds linger{100};
-  /// Whether lookups read frames of other processes of this computer in the memory of those, and
-  /// those read a Node's frames in its memory (docs/memory.md). Where that is not possible, owners
-  /// are asked over DDS.
-  bool shared_memory = shared_memory_of_environment();
 };
 
 /// How to watch a path.

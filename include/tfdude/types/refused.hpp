@@ -4,7 +4,7 @@
 
 namespace tfdude {
 
-/// How often a Node has rejected something since it started: by its limits (Options::limits),
+/// How often a Node has rejected something since it started: by its limits (NodeOptions::limits),
 /// because one sender took more than its share of an overloaded process, or because it was
 /// malformed.
 struct RefusedCounts {

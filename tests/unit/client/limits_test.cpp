@@ -20,12 +20,13 @@ Time at(int milliseconds) { return Time(std::chrono::milliseconds(1'000'000 + mi
 
 struct Pair {
   explicit Pair(const PartitionLimits& limits, bool shared_memory = true) {
-    Options options;
+    Options common;
+    common.shared_memory = shared_memory;
+    NodeOptions options = common;
     options.limits = limits;
-    options.shared_memory = shared_memory;
     node.emplace(*Node::open(network.join(), "arm",
                              {{"root", "", {}}, {"a", "root", {}}, {"b", "root", {}}}, options));
-    client.emplace(*Client::open(network.join(), options));
+    client.emplace(*Client::open(network.join(), common));
   }
 
   LoopbackNetwork network;

@@ -29,7 +29,7 @@ TEST_CASE("node: the name of its partition keeps its address as others appear") 
 
 TEST_CASE("node: requests during the start are stored together with the configured frames") {
   const testing::TemporaryDirectory directory;
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   options.discovery = Milliseconds(0);
   std::vector<FrameSpec> frames{{"root", "", {}}};

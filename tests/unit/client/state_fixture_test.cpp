@@ -69,7 +69,7 @@ TEST_CASE("a stored state of format 2 has all its content") {
 TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
   const TemporaryDirectory directory;
   copy_into(directory);
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   options.discovery = Milliseconds(0);
   const auto config = load_config(kFixture + "/arms.yaml");
@@ -107,7 +107,7 @@ TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
 TEST_CASE("zeros of a state of format 3 stay exact until its entry is changed") {
   const TemporaryDirectory directory;
   const std::string file = copy_into(directory, kFormat3);
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   options.discovery = Milliseconds(0);
   auto config = load_config(kFormat3 + "/arms.yaml");

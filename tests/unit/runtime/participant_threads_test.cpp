@@ -74,10 +74,11 @@ std::multiset<std::string> thread_names() {
 
 TEST_CASE("threads: owners with a store and clients agree after concurrent changes") {
   const TemporaryDirectory directory;
-  Options options;
+  Options common;
+  common.timeout = Milliseconds(20000);
+  NodeOptions options = common;
   options.state = directory.path();
   options.save_every = Milliseconds(1);
-  options.timeout = Milliseconds(20000);
   LoopbackNetwork network;
   std::vector<std::string> wrong(kCallers +
                                  1);  // what should have succeeded and did not, a caller each
@@ -86,7 +87,7 @@ TEST_CASE("threads: owners with a store and clients agree after concurrent chang
     auto arms = *Node::open(network.join(), "arms", {{"arm", "", {}}}, options);
     auto head = *Node::open(network.join(), "head", {{"neck", "arm", {}}}, options);
     std::vector<Client> clients;
-    for (int i = 0; i < kCallers; ++i) clients.push_back(*Client::open(network.join(), options));
+    for (int i = 0; i < kCallers; ++i) clients.push_back(*Client::open(network.join(), common));
     const auto subscription = clients[0].on_change([&](const Change& change) {
       ++told;
       (void)clients[0].exists(change.frame);
@@ -115,7 +116,7 @@ TEST_CASE("threads: owners with a store and clients agree after concurrent chang
 TEST_CASE("participant: it serves and watches and waits and listens on six named threads") {
   LoopbackNetwork network;
   const TemporaryDirectory directory;
-  Options options;
+  NodeOptions options;
   options.state = directory.path();
   Node head = Node::open(network.join(), "head", {{"head", "", {}}, {"eye", "head", {}}}).value();
   Node arm = Node::open(network.join(), "arm", {{"arm", "head", {}}, {"hand", "arm", {}}}, options)
