@@ -176,7 +176,6 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   const std::string source = source_ + "." + std::to_string(attempts_);
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
-  untie_outdated(plan_, path, *edges);
   loosen(plan_, *edges);
   const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
       *edges, measurement_.X_AB, source, measurement_.options);

@@ -58,6 +58,7 @@ void JointPrior::take_unknown(std::size_t edge) {
   edges_ = {edge};
   own_ = {all_[edge].X_PC.unknown->matrix()};
   own_roots_ = {root_of(own_.front())};
+  sources_.clear();
   of_unknown_ = true;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,8 @@ class JointPrior {
   /// Takes the own parts and common errors of the edges. Edges without either are left out.
   explicit JointPrior(const std::vector<ObservedEdge>& all);
 
-  /// Treats the edge's unknown part as its own; no other edge may be uncertain.
+  /// Treats the edge's unknown part as its own; no other edge of the path may be uncertain. Those
+  /// beside the path are left out.
   void take_unknown(std::size_t edge);
   [[nodiscard]] bool is_of_unknown() const { return of_unknown_; }
 
@@ -47,6 +49,12 @@ class JointPrior {
   /// Whether an uncertain edge is not on the path.
   [[nodiscard]] bool is_beside(std::size_t i) const {
     return all_[edges_[i]].way == ObservedEdge::Way::kBeside;
+  }
+
+  /// Whether an uncertain edge is on the path.
+  [[nodiscard]] bool has_path() const {
+    const auto on_path = [&](std::size_t k) { return all_[k].way != ObservedEdge::Way::kBeside; };
+    return std::any_of(edges_.begin(), edges_.end(), on_path);
   }
 
   /// A root of P_ii.

@@ -75,13 +75,13 @@ class Update {
       if (all_[k].way == ObservedEdge::Way::kBeside) continue;
       if (all_[k].X_PC.unknown && !all_[k].X_PC.unknown->matrix().isZero(0)) unknown.push_back(k);
     }
-    if (!prior_.edges().empty()) {
+    if (unknown.size() == 1 && !prior_.has_path()) {
+      prior_.take_unknown(unknown.front());
+    } else if (!prior_.edges().empty()) {
       const auto H = at_start().H;
       for (const std::size_t k : unknown) {
         R_ = bound(R_, seen(H[k], all_[k].X_PC.unknown->matrix()));
       }
-    } else if (unknown.size() == 1) {
-      prior_.take_unknown(unknown.front());
     } else if (unknown.empty()) {
       return fail(Errc::kInvalidInput,
                   "all edges of the path are known exactly: none can be corrected");

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <string_view>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/stamp.hpp"
-#include "tree/sample_rows.hpp"
 
 namespace tfdude {
 namespace {
@@ -79,66 +77,8 @@ void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t 
   }
 }
 
-// An observation that needs many columns has several sources.
-std::string_view observation_of(const CommonError& error) {
-  return std::string_view(error.source).substr(0, error.source.find('+'));
-}
-
-bool depends_on(const Belief& X, std::string_view observation) {
-  return std::any_of(X.common_errors.begin(), X.common_errors.end(),
-                     [&](const CommonError& one) { return observation_of(one) == observation; });
-}
-
 bool was_observed(const Belief& X) {
   return std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
-}
-
-bool is_uncertain(const Belief& X) {
-  const auto counts = [](const CommonError& one) { return !one.loading.isZero(0); };
-  return X.unspecified || X.unknown || !X.own.matrix().isZero(0) ||
-         std::any_of(X.common_errors.begin(), X.common_errors.end(), counts);
-}
-
-// Whether a sample was left out of a later observation of the edges that it was observed with. Such
-// an observation merges the sources that it meets, so a static edge that still has the sample's
-// source has not taken part in one. Samples of other edges tell nothing: they may be left out, too.
-bool is_outdated(const ObservePlan& plan, const ObservedPath& path, std::size_t row) {
-  const std::size_t edge = path.rows[row].edge;
-  const std::string& id = plan.edges[edge].info.id;
-  const auto& with = path.correlations[row].observed_with;
-  const auto is_sample = [&](std::size_t k) {
-    const std::string& one = plan.edges[k].info.id;
-    return is_moving(one, path.correlations[k]) && !is_drifting(one, path.correlations[k]);
-  };
-  if (!is_sample(edge)) return false;
-  const auto is_over = [&](const CommonError& error) {
-    if (!is_observed(error) || is_own_of_row(error)) return false;
-    bool lacks = false;
-    for (std::size_t k = 0; k < plan.edges.size(); ++k) {
-      const std::string& other = plan.edges[k].info.id;
-      if (k == edge || other == id || std::count(with.begin(), with.end(), other) == 0) continue;
-      const bool shares = depends_on(path.edges[k].X_PC, observation_of(error));
-      if (shares && !is_sample(k)) return false;
-      const bool beside = path.edges[k].way == Way::kBeside;
-      lacks = lacks || (!shares && (was_observed(path.edges[k].X_PC) || (is_sample(k) && beside)));
-    }
-    return lacks;
-  };
-  const auto& errors = path.edges[row].X_PC.common_errors;
-  return std::any_of(errors.begin(), errors.end(), is_over);
-}
-
-// All of its error but the common errors of named sources is of unknown correlation.
-void untie(Belief& X) {
-  Belief rest = X;
-  std::vector<CommonError> named;
-  const auto is_named = [](const CommonError& one) { return !is_observed(one); };
-  std::copy_if(X.common_errors.begin(), X.common_errors.end(), std::back_inserter(named), is_named);
-  auto& left = rest.common_errors;
-  left.erase(std::remove_if(left.begin(), left.end(), is_named), left.end());
-  X.unknown = collapse(rest).covariance.of_specified();
-  X.own = {};
-  X.common_errors = std::move(named);
 }
 
 // An edge beside the path is corrected at the instants at which it was observed, not at its newest.
@@ -353,29 +293,6 @@ void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges) {
     Belief& X = edges[k].X_PC;
     X.own = Covariance::trusted(Matrix6d((1 + 1 / kMore) * X.unknown->matrix()));
     X.unknown.reset();
-  }
-}
-
-void untie_outdated(const ObservePlan& plan, const ObservedPath& path,
-                    std::vector<ObservedEdge>& edges) {
-  const auto on_path = [](const ObservedEdge& edge) { return edge.way != Way::kBeside; };
-  const auto uncertain = std::count_if(edges.begin(), edges.end(), [&](const ObservedEdge& edge) {
-    return on_path(edge) && is_uncertain(edge.X_PC);
-  });
-  bool alone = false;
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    Belief& X = edges[k].X_PC;
-    if (X.unspecified || !is_outdated(plan, path, k)) continue;
-    if (!on_path(edges[k])) {
-      X.common_errors.clear();
-    } else if (uncertain > 1) {
-      untie(X);
-    } else {
-      alone = true;
-    }
-  }
-  for (ObservedEdge& edge : edges) {
-    if (alone && !on_path(edge)) edge.X_PC.common_errors.clear();
   }
 }
 

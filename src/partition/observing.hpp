@@ -73,14 +73,6 @@ struct ObservedPath {
 /// @param edges  those of the path
 void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges);
 
-/// Makes what is not known any more of how the edges are correlated unknown. If a sample of a
-/// dynamic edge was observed, and what it was observed with was observed again without it, its
-/// error may be correlated with theirs in any way. On the path it becomes one of unknown
-/// correlation, unless all others there are exact; beside the path it takes no part.
-/// @param edges  those of the path
-void untie_outdated(const ObservePlan& plan, const ObservedPath& path,
-                    std::vector<ObservedEdge>& edges);
-
 /// The parts of the owners: a ReviseRequest for each owner of an uncertain edge.
 /// @param absent  edges that are correlated with them, and keep their values
 [[nodiscard]] std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,

@@ -28,18 +28,20 @@ void Forest::Impl::set_correlation(HeldVersion& fresh, InArena<EdgeCorrelation> 
   fresh.correlation = correlation.release();
 }
 
-void Forest::Impl::end_revision(HeldVersion& fresh, const SampleRevision* by) {
+void Forest::Impl::end_revision(HeldVersion& fresh, Ties ties) {
   if (fresh.correlation == nullptr || !fresh.correlation->revised()) return;
   // The next value of an edge that drifts has the same error.
-  if (by == nullptr && !drifts(fresh)) unlink(fresh);
+  if (ties == Ties::kEnd && !drifts(fresh)) {
+    unlink(fresh, fresh.correlation->now().observed_with);
+  }
   const Correlation& said = fresh.correlation->said();
   if (said.empty()) return set_correlation(fresh, nullptr);
   correlate(fresh, said);
 }
 
-void Forest::Impl::unlink(const HeldVersion& edge) {
+void Forest::Impl::unlink(const HeldVersion& edge, const std::vector<std::string>& partners) {
   const std::string_view id = edge.name->text;
-  for (const std::string& other : edge.correlation->now().observed_with) {
+  for (const std::string& other : partners) {
     const auto slot = frames_.held_slot(other);
     if (!slot || *slot == edge.slot) continue;
     const HeldVersion& partner = frames_.newest_value(*slot);

@@ -136,6 +136,7 @@ void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
     revision = {{*given, {}}, fresh.correlation->now(), row};
   }
   append_to(fresh, {fresh.X_PC, nullptr, revised ? &revision : nullptr}, nanoseconds(*left.stamp));
+  if (revised) fresh.samples->set_observed(fresh.commit);
   fresh.samples->left_behind = true;
 }
 

@@ -182,12 +182,19 @@ class Forest::Impl {
   [[nodiscard]] static bool drifts(const HeldVersion& edge) {
     return edge.samples != nullptr && edge.samples->timing().drifts;
   }
+  /// What becomes of what the former value was tied to.
+  enum class Ties : std::uint8_t {
+    kEnd,
+    kStay,  ///< it is still a sample, or an observation gives the next one, and says it itself
+  };
   /// Drops what an observation has set for the edge, with its value.
-  /// @param by  the observation that gives the next value, if one does: it says itself what that is
-  ///   tied to
-  void end_revision(HeldVersion& fresh, const SampleRevision* by = nullptr) TFDUDE_REQUIRES(mutex_);
-  /// The edges that were observed with this one are not correlated with its next value.
-  void unlink(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
+  void end_revision(HeldVersion& fresh, Ties ties = Ties::kEnd) TFDUDE_REQUIRES(mutex_);
+  /// The edges that were observed with this one are not correlated with it any more.
+  void unlink(const HeldVersion& edge, const std::vector<std::string>& partners)
+      TFDUDE_REQUIRES(mutex_);
+  /// Unlinks the last row of a dynamic edge, if the revisions leave it out. As revise_samples().
+  void leave_out(std::uint32_t slot, const std::vector<const Revision*>& revisions,
+                 std::int64_t stamp) TFDUDE_REQUIRES(mutex_);
   /// Makes the row of a dynamic edge's newest sample that of the edge.
   void show_revision(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
   /// Corrects a dynamic edge at an instant. If it drifts, later samples have the same error, up to

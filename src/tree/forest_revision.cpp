@@ -34,6 +34,13 @@ std::vector<const Revision*> samples_of(const std::vector<Revision>& edges, std:
   return all;
 }
 
+// Whether an observation has merged the sources of these and of what they were observed with. One
+// of unknown correlation takes nothing else along.
+bool merges(const std::vector<const Revision*>& revisions) {
+  return std::any_of(revisions.begin(), revisions.end(),
+                     [](const Revision* one) { return !one->correlation.unknown; });
+}
+
 bool shares_observation(const Correlation& one, const Correlation& other) {
   const auto has = [&](const std::string& source) {
     return std::any_of(other.common_errors.begin(), other.common_errors.end(),
@@ -137,6 +144,19 @@ void Forest::Impl::untie_samples(std::uint32_t slot, std::int64_t from, std::int
   }
 }
 
+// What the last row of an edge that does not drift was observed with goes on without the edge, if
+// the revisions leave that row out.
+void Forest::Impl::leave_out(std::uint32_t slot, const std::vector<const Revision*>& revisions,
+                             std::int64_t stamp) {
+  const HeldVersion& edge = frames_.newest_value(slot);
+  const Sample* row = drifts(edge) || edge.lacks_sample() ? nullptr : last_row(edge);
+  if (row == nullptr || !merges(revisions)) return;
+  const bool takes_part = std::any_of(revisions.begin(), revisions.end(), [&](const Revision* one) {
+    return (one->stamp ? nanoseconds(*one->stamp) : stamp) == row->stamp;
+  });
+  if (!takes_part) unlink(edge, row->revision()->correlation().observed_with);
+}
+
 // Rows that the revisions leave out are over: what ties the others to them is lost.
 void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
                                   std::int64_t stamp) {
@@ -168,6 +188,9 @@ void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Re
     const bool follows = i > 0 && is_tied(*revisions[i - 1]);
     const std::int64_t before = follows ? stamp_of(*revisions[i - 1]) : kAlways;
     revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before});
+  }
+  if (merges(revisions)) {
+    frames_.newest_value(slot).samples->set_observed(frames_.commit_being_made());
   }
 }
 
@@ -246,7 +269,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
-  if (is_newest) end_revision(fresh, value.revision);
+  if (is_newest) end_revision(fresh, value.revision != nullptr ? Ties::kStay : Ties::kEnd);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   fresh.number = fresh.samples->next() - 1;
@@ -266,23 +289,24 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
     if (!ok) return ok;
     slots.push_back(*slot);
   }
-  // Values that a later one follows are over. This comes first, as the revisions list each other.
-  for (const std::uint32_t slot : slots) {
-    const HeldVersion& newest = impl_->frames_.newest_value(slot);
-    if (!stamp || !newest.moving() || nanoseconds(*stamp) <= newest.stamp) continue;
-    const bool revised = newest.correlation != nullptr && newest.correlation->revised();
-    if (revised && !Impl::drifts(newest)) impl_->unlink(newest);
+  const std::int64_t at = stamp ? nanoseconds(*stamp) : kAlways;
+  const auto is_first = [&](std::size_t i) {
+    return std::count(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(i), slots[i]) == 0;
+  };
+  const auto is_sampled = [&](std::size_t i) {
+    return impl_->frames_.newest_value(slots[i]).moving() && (stamp || edges[i].stamp);
+  };
+  // This comes first, as the revisions list each other.
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    if (is_first(i) && is_sampled(i)) impl_->leave_out(slots[i], samples_of(edges, i, at), at);
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    if (std::count(slots.begin(), slots.begin() + static_cast<std::ptrdiff_t>(i), slots[i]) > 0) {
-      continue;
-    }
-    const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
-    if (newest.moving() && (stamp || edges[i].stamp)) {
-      const std::int64_t at = stamp ? nanoseconds(*stamp) : kAlways;
+    if (!is_first(i)) continue;
+    if (is_sampled(i)) {
       impl_->revise_samples(slots[i], samples_of(edges, i, at), at);
       continue;
     }
+    const HeldVersion& newest = impl_->frames_.newest_value(slots[i]);
     const Correlation said =
         newest.correlation != nullptr ? newest.correlation->said() : Correlation();
     HeldVersion& fresh = impl_->push_held(slots[i], edges[i].X_PC);

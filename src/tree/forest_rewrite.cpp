@@ -108,7 +108,7 @@ void Forest::Impl::replace_samples(const HeldVersion& newest, std::int64_t from,
   edge.history = edge.commit;
   if (!keeps_newest) {
     edge.stamp = samples.back().stamp;
-    end_revision(edge, samples.back().revision);
+    end_revision(edge, samples.back().revision != nullptr ? Ties::kStay : Ties::kEnd);
   }
   reclaimer_.supersede(&before);
   drop_samples(*fresh, edge.stamp);

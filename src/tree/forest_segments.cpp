@@ -234,27 +234,6 @@ SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
   return found;
 }
 
-void add(const std::vector<std::string>& ids, std::vector<std::string>& all) {
-  std::copy_if(ids.begin(), ids.end(), std::back_inserter(all),
-               [&](const std::string& id) { return std::count(all.begin(), all.end(), id) == 0; });
-}
-
-// The edges that the dynamic edge's value at that instant was observed with. Between two samples it
-// depends on both, unless the edge drifts.
-std::vector<std::string> observed_with_at(const HeldVersion& edge, std::int64_t t) {
-  SampleHistory::Bracket found{edge.samples->sample(edge.number), nullptr};
-  std::uint64_t back = 0;
-  if (t < edge.stamp) found = edge.samples->around(t, edge.number, back);
-  if (found.before != nullptr && found.before->stamp == t) found.after = nullptr;
-  if (edge.samples->timing().drifts) found.after = nullptr;
-  std::vector<std::string> all;
-  for (const Sample* sample : {found.before, found.after}) {
-    if (sample == nullptr || !is_correlated(*sample)) continue;
-    add(sample->revision()->correlation().observed_with, all);
-  }
-  return all;
-}
-
 // A dynamic edge is listed with itself twice: what was observed is its sample, and a later one has
 // another error. One that drifts is listed three times: its later error follows from the earlier
 // one.
@@ -274,14 +253,11 @@ void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues
     const HeldVersion* edge = edge_of(edges[i]);
     if (edge == nullptr) continue;
     if (edge->moving() && !edge->unsampled()) {
-      found.correlations[i].observed_with = marks_of(OwnEdge{edge}, *edge->name);
+      auto& with = found.correlations[i].observed_with;
+      with = marks_of(OwnEdge{edge}, *edge->name);
       if (!found.stamp) continue;
-      const std::int64_t t = nanoseconds(*found.stamp);
-      const auto told = tell_rows(*edge, i, t, rows, found);
-      auto others = told.value_or(std::vector<std::string>());
-      if (!told || !edge->samples->timing().drifts) add(observed_with_at(*edge, t), others);
-      auto& all = found.correlations[i].observed_with;
-      std::copy_if(others.begin(), others.end(), std::back_inserter(all),
+      const auto others = tell_rows(*edge, i, nanoseconds(*found.stamp), rows, found);
+      std::copy_if(others.begin(), others.end(), std::back_inserter(with),
                    [&](const std::string& id) { return id != edge->name->text; });
     } else if (edge->correlation != nullptr) {
       found.correlations[i].observed_with = edge->correlation->now().observed_with;

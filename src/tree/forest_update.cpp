@@ -137,7 +137,8 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
   // With its beginning, watchers are told that the edge drifts.
   if (!newest.moving() && drifts(newest)) fresh.history = fresh.commit;
   fresh.samples = samples;
-  end_revision(fresh, value.revision);
+  const bool goes_on = newest.moving() && !newest.lacks_sample();
+  end_revision(fresh, goes_on || value.revision != nullptr ? Ties::kStay : Ties::kEnd);
   append_to(fresh, value, stamp);
   drop_samples(*samples, stamp);
 }

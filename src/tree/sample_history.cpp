@@ -119,6 +119,7 @@ SampleHistory::Pointer SampleHistory::copy(std::uint64_t capacity, std::uint64_t
   Pointer copy = create(*arena_, timing_, capacity);
   const std::uint64_t first = oldest();
   copy->rewritten = rewritten;
+  copy->set_observed(observed());
   copy->left_behind = left_behind;
   copy->earlier_ = earlier_;
   copy->made_up_end_.store(made_up_end_.load(std::memory_order_relaxed), std::memory_order_relaxed);

@@ -207,6 +207,11 @@ class SampleHistory {
   /// The commit of the last sample that was inserted or replaced. Set before readers see it.
   std::uint64_t rewritten = 0;
 
+  /// The commit of the last observation of the edge: samples that an earlier one has corrected were
+  /// left out of it.
+  [[nodiscard]] std::uint64_t observed() const { return observed_.load(std::memory_order_relaxed); }
+  void set_observed(std::uint64_t commit) { observed_.store(commit, std::memory_order_relaxed); }
+
   /// Its only sample is the last one of an earlier process. What was between that and the next
   /// sample nobody has measured, so the next one begins another history. Set before readers see it.
   bool left_behind = false;
@@ -275,6 +280,7 @@ class SampleHistory {
   std::atomic<std::uint64_t> first_{0};
   // The stamps of samples from this number on came with them.
   std::atomic<std::uint64_t> made_up_end_{0};
+  std::atomic<std::uint64_t> observed_{0};
   std::uint64_t next_ = 0;
   Ends ends_;
   // The last ones, newest first: enough for watchers that get what is new many times a second.

@@ -180,28 +180,66 @@ void set_value(const Tied& tied, std::size_t i, SegmentValues& found) {
   found.values[i].covariance = Covariance();
 }
 
-// Of an edge whose last row cannot be corrected with it, as its error is of unknown correlation.
-void forget_correlation(std::size_t i, SegmentValues& found) {
-  PathCorrelation& correlation = found.correlations[i];
-  const Belief all = belief_of(found.values[i], correlation);
-  const bool complete = !all.unspecified;
-  correlation.unknown = collapse(all).covariance.of_specified();
-  correlation.common_errors.clear();
+// What observations have tied to others is of unknown correlation.
+void untie(std::size_t i, SegmentValues& found) {
+  auto& errors = found.correlations[i].common_errors;
+  const auto tied = std::stable_partition(errors.begin(), errors.end(),
+                                          [](const CommonError& one) { return !is_observed(one); });
+  Belief rest = belief_of(found.values[i], found.correlations[i]);
+  rest.common_errors.assign(tied, errors.end());
+  errors.erase(tied, errors.end());
+  found.correlations[i].unknown = collapse(rest).covariance.of_specified();
   found.values[i].covariance = Covariance();
-  found.values[i].covariance.set_complete(complete);
+  found.values[i].covariance.set_complete(!rest.unspecified);
 }
 
-// The last one that was observed, of an edge whose samples err independently. Null: none is tied to
-// other edges.
-const Sample* last_tied(const HeldVersion& edge) {
-  for (std::uint64_t back = 0; back <= std::min(edge.number, kMany); ++back) {
-    const Sample* sample = edge.samples->sample(edge.number - back);
-    if (sample == nullptr) break;
-    if (sample->revision() == nullptr || !sample->revision()->row.observed) continue;
-    const bool tied = is_correlated(*sample) && !sample->revision()->correlation().unknown;
-    return tied && sample->complete() ? sample : nullptr;
+void add(const std::vector<std::string>& ids, std::vector<std::string>& all) {
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(all),
+               [&](const std::string& id) { return std::count(all.begin(), all.end(), id) == 0; });
+}
+
+// From which the value at an instant was computed.
+SampleHistory::Bracket samples_at(const HeldVersion& edge, std::int64_t t) {
+  SampleHistory::Bracket found{edge.samples->sample(edge.number), nullptr};
+  std::uint64_t back = 0;
+  if (t < edge.stamp) found = edge.samples->around(t, edge.number, back);
+  if (found.before != nullptr && found.before->stamp == t) found.after = nullptr;
+  if (edge.samples->timing().drifts) found.after = nullptr;
+  return found;
+}
+
+// The edges that a value was observed with.
+std::vector<std::string> observed_with(const SampleHistory::Bracket& samples) {
+  std::vector<std::string> all;
+  for (const Sample* sample : {samples.before, samples.after}) {
+    if (sample == nullptr || !is_correlated(*sample)) continue;
+    add(sample->revision()->correlation().observed_with, all);
   }
-  return nullptr;
+  return all;
+}
+
+// Whether the sample of an edge that does not drift was part of all that its partners were observed
+// in since.
+bool is_row(const HeldVersion& edge, const Sample& sample) {
+  return is_correlated(sample) && sample.commit == edge.samples->observed() &&
+         !sample.revision()->correlation().unknown && sample.complete() &&
+         !is_long_ago(edge, sample);
+}
+
+// Whether the sample is tied to others, which may have been observed without it since.
+bool is_left_out(const HeldVersion& edge, const Sample* sample) {
+  if (sample == nullptr || !is_correlated(*sample) || is_row(edge, *sample)) return false;
+  const auto& errors = sample->revision()->correlation().common_errors;
+  return std::any_of(errors.begin(), errors.end(), is_observed);
+}
+
+// Whether an observation of a path on which the value is corrects it.
+bool is_corrected(std::size_t i, const SegmentValues& found) {
+  const Belief X = belief_of(found.values[i], found.correlations[i]);
+  const auto counts = [](const CommonError& one) { return !one.loading.isZero(0); };
+  return X.unspecified ||
+         (!X.unknown && (!X.own.matrix().isZero(0) ||
+                         std::any_of(X.common_errors.begin(), X.common_errors.end(), counts)));
 }
 
 // What the value between two samples has of the later one's own part becomes an error that both
@@ -227,16 +265,22 @@ void share_later(const HeldVersion& edge, std::int64_t t, const Sample& later, R
 }
 
 // The samples of an edge that does not drift err independently, until an observation ties them to
-// others. Those that were observed after the instant are still looked up, so the last of them is
-// corrected, too.
-std::optional<std::vector<std::string>> tell_later_row(const HeldVersion& edge, std::size_t segment,
-                                                       std::int64_t t, Rows asked,
-                                                       SegmentValues& found) {
-  const Sample* later = last_tied(edge);
-  if (later == nullptr || later->stamp <= t) return std::nullopt;
-  RowOfSample row = as_stored(*later, segment, said_of(edge));
-  if (asked == Rows::kOfPath) share_later(edge, t, *later, row, found);
-  std::vector<std::string> with = row.correlation.observed_with;
+// others. The last of these is part of all observations of its partners, and of earlier instants,
+// until a later one is observed without it.
+std::vector<std::string> tell_last_row(const HeldVersion& edge, std::size_t segment, std::int64_t t,
+                                       Rows asked, SegmentValues& found) {
+  const SampleHistory::Bracket here = samples_at(edge, t);
+  std::vector<std::string> with = observed_with(here);
+  const bool left_out = is_left_out(edge, here.before) || is_left_out(edge, here.after);
+  if (left_out) untie(segment, found);
+  const Sample* last = last_row(edge);
+  if (last == nullptr) return with;
+  const bool of_path = asked == Rows::kOfPath;
+  const bool stands_for_it = last->stamp < t && is_corrected(segment, found);
+  if (of_path && (last->stamp == t || stands_for_it)) return with;
+  RowOfSample row = as_stored(*last, segment, said_of(edge));
+  add(row.correlation.observed_with, with);
+  if (of_path && !left_out) share_later(edge, t, *last, row, found);
   found.rows.push_back(std::move(row));
   return with;
 }
@@ -250,7 +294,14 @@ const Sample* last_observed(const HeldVersion& edge) {
   return row != nullptr && row->revision() != nullptr ? row : nullptr;
 }
 
-bool is_own_of_row(const CommonError& error) { return error.source.rfind(own_prefix(), 0) == 0; }
+const Sample* last_row(const HeldVersion& edge) {
+  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
+    const Sample* sample = edge.samples->sample(number);
+    if (sample == nullptr || edge.number - number > kMany) break;
+    if (is_row(edge, *sample)) return sample;
+  }
+  return nullptr;
+}
 
 std::size_t observed_since(const HeldVersion& edge, std::int64_t t) {
   std::size_t count = 0;
@@ -262,21 +313,22 @@ std::size_t observed_since(const HeldVersion& edge, std::int64_t t) {
   return count;
 }
 
-std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge, std::size_t segment,
-                                                  std::int64_t t, Rows asked,
-                                                  SegmentValues& found) {
-  if (asked == Rows::kNone || t > edge.stamp) return std::nullopt;
-  if (!edge.samples->timing().drifts) return tell_later_row(edge, segment, t, asked, found);
+std::vector<std::string> tell_rows(const HeldVersion& edge, std::size_t segment, std::int64_t t,
+                                   Rows asked, SegmentValues& found) {
+  const auto alone = [&] { return observed_with(samples_at(edge, t)); };
+  if (asked == Rows::kNone) return alone();
+  if (!edge.samples->timing().drifts) return tell_last_row(edge, segment, t, asked, found);
+  if (t > edge.stamp) return alone();
   const std::vector<const Sample*> rows = rows_of(edge);
-  if (rows.empty()) return std::nullopt;
+  if (rows.empty()) return alone();
   const Sample& last = *rows.front();
   const bool later = t > last.stamp;
-  const bool alone = later && last.revision()->row.lasts == 0;
-  if (alone && (asked == Rows::kOfPath || is_long_ago(edge, last))) return std::nullopt;
+  const bool only = later && last.revision()->row.lasts == 0;
+  if (only && (asked == Rows::kOfPath || is_long_ago(edge, last))) return alone();
   const Correlation* said = said_of(edge);
   const Correlation& correlation = last.revision()->correlation();
   if (correlation.unknown || !last.complete()) {
-    if (asked == Rows::kOfPath && t < last.stamp) forget_correlation(segment, found);
+    if (asked == Rows::kOfPath && t < last.stamp) untie(segment, found);
     return partners_of(edge, last);
   }
   std::vector<RowOfSample> told;

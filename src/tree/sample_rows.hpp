@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,22 +30,23 @@ static_assert(lasting(kMostRows) == kRowLasts * kMostRows);
 /// The newest sample that was observed itself; null: none. From it the edge's newest value follows.
 [[nodiscard]] const Sample* last_observed(const HeldVersion& edge);
 
+/// Of an edge that does not drift: the newest sample that takes part in all observations of what it
+/// was observed with; null: none.
+[[nodiscard]] const Sample* last_row(const HeldVersion& edge);
+
 /// At how many instants after this one, up to kMostRows, the edge was observed.
 [[nodiscard]] std::size_t observed_since(const HeldVersion& edge, std::int64_t t);
-
-/// Whether this is the own part of a row, that others have in common with it.
-[[nodiscard]] bool is_own_of_row(const CommonError& error);
 
 /// Adds the rows of a dynamic edge to what was found of it at an instant, and makes the value there
 /// one that is correlated with them. If the edge drifts, the value between two rows is tied to
 /// both, as the walk in between is known (a Brownian bridge). Before the first row only that is
 /// known by how much the edge may have drifted until then, but not how this is correlated with what
 /// was seen since: it counts as of unknown correlation. If it does not drift, its samples err
-/// independently; then only the last one that was observed is a row, and only for earlier instants.
+/// independently, and only the last one that was observed is a row. The edge's observations since
+/// then may have left out other samples that were observed: these count as of unknown correlation.
 /// @param segment  of `found`, whose value at the instant was looked up
-/// @return the edges that it was observed with; empty: the value stays, and there are no rows
-[[nodiscard]] std::optional<std::vector<std::string>> tell_rows(const HeldVersion& edge,
-                                                                std::size_t segment, std::int64_t t,
-                                                                Rows asked, SegmentValues& found);
+/// @return the edges that it was observed with
+[[nodiscard]] std::vector<std::string> tell_rows(const HeldVersion& edge, std::size_t segment,
+                                                 std::int64_t t, Rows asked, SegmentValues& found);
 
 }  // namespace tfdude

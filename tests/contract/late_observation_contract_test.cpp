@@ -133,6 +133,15 @@ class Cameras {
     REQUIRE(node_->update("base", {along_x(0).pose, on_line(kLocalized * kLocalized)}, at(step)));
   }
 
+  // An object gets a new value, or goes.
+  void replace(const std::string& id) {
+    REQUIRE(node_->update(id, {along_x(1).pose, on_line(kMount * kMount)}));
+    sigma_.row(index(id)).setZero();
+    sigma_.col(index(id)).setZero();
+    sigma_(index(id), index(id)) = kMount * kMount;
+  }
+  void remove(const std::string& id) { REQUIRE(node_->remove(id)); }
+
   // Sees what it expects. @return by which factor the variance of what was seen is too large
   double see(const std::string& from, const std::string& id, int step) {
     const Query query = when(step);
@@ -240,6 +249,28 @@ TEST_CASE("late observations: what a standing edge was observed with forgets no 
   line.see("left", "far", 3);
   for (const char* id : {"near", "far"}) CHECK(line.ratio("world", id, 2) > 0.999);
   for (const char* id : {"left", "right"}) CHECK(line.ratio("base", id, 2) > 0.999);
+}
+
+TEST_CASE("late observations: a sample stays tied to what its partner was seen with") {
+  enum class Partner { kStays, kReplaced, kRemoved };
+  const auto partner = GENERATE(Partner::kStays, Partner::kReplaced, Partner::kRemoved);
+  const bool later_is_seen = GENERATE(false, true);
+  CAPTURE(static_cast<int>(partner), later_is_seen);
+  Cameras line(2);
+  line.localize(0);
+  line.see("base", "near", 0);
+  line.localize(1);
+  if (later_is_seen) line.see("base", "left", 1);
+  line.see("near", "far", 1);  // ties the far object to the base's first sample
+  if (partner == Partner::kReplaced) line.replace("near");
+  if (partner == Partner::kRemoved) line.remove("near");
+  line.see("base", "far", 0);
+  // Once a later sample was seen, the earlier one is no row any more.
+  for (const auto& [from, id] : {std::pair("world", "far"), std::pair("base", "far")}) {
+    CAPTURE(from, id, line.ratio(from, id, 1));
+    CHECK(line.ratio(from, id, 1) > 1 - 1e-6);
+    if (!later_is_seen) CHECK(line.ratio(from, id, 1) < 1 + 1e-6);
+  }
 }
 
 TEST_CASE("late observations: in the order of their instants they are exact") {

@@ -198,7 +198,7 @@ TEST_CASE("A revision of static edges holds until their next update") {
   CHECK(updated->correlations[1].common_errors.size() == 2);
 }
 
-TEST_CASE("The last sample that was observed is a row beside an earlier instant") {
+TEST_CASE("The last sample that was observed is a row, until a later one is observed without it") {
   Random random(658);
   INFO("seed " << random.seed());
   Robot robot(random);
@@ -216,8 +216,10 @@ TEST_CASE("The last sample that was observed is a row beside an earlier instant"
     return robot.forest.lookup_segments({{"world", "a"}}, query, std::nullopt, true, rows).value();
   };
   for (const Rows rows : {Rows::kOfPath, Rows::kAll}) {
-    CHECK(asked(20ms, rows).rows.empty());
-    CHECK(asked(25ms, rows).rows.empty());
+    // On a path the value is the row, or stands for it.
+    for (const auto since : {20ms, 25ms}) {
+      CHECK(asked(since, rows).rows.size() == (rows == Rows::kAll ? 1 : 0));
+    }
     const SegmentValues before = asked(10ms, rows);
     REQUIRE(before.rows.size() == 1);
     CHECK(before.rows[0].stamp == at(20ms));
@@ -239,6 +241,17 @@ TEST_CASE("The last sample that was observed is a row beside an earlier instant"
   const auto& shared_now = between.correlations[0].common_errors;
   REQUIRE(shared_now.size() == 2);
   CHECK(shared_now.back().source == between.rows[0].correlation.common_errors.back().source);
+  // A later one is observed without it.
+  const CommonError then = common_error(random, "observed:2");
+  REQUIRE(robot.forest.revise({{"a", X, {false, {then}, {"a", "c"}}}}, at(30ms), UINT64_MAX));
+  const SegmentValues left_out = asked(20ms, Rows::kOfPath);
+  REQUIRE(left_out.rows.size() == 1);
+  CHECK(left_out.rows[0].stamp == at(30ms));
+  CHECK(left_out.correlations[0].common_errors.empty());
+  REQUIRE(left_out.correlations[0].unknown);
+  CHECK(covariance_diff(*left_out.correlations[0].unknown,
+                        whole(asked(20ms, Rows::kNone)).covariance.of_specified(), 1e-12) == "");
+  CHECK(left_out.correlations[0].observed_with == std::vector<std::string>{"a", "a", "b", "c"});
 }
 
 TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
