@@ -6,6 +6,7 @@
 #include "tfdude/math/interpolate.hpp"
 
 #include "math/finite.hpp"
+#include "tree/edge_marks.hpp"
 #include "tree/epoch.hpp"
 #include "tree/forest_impl.hpp"
 #include "tree/held_edges.hpp"
@@ -13,7 +14,6 @@
 #include "tree/path_walk.hpp"
 #include "tree/read_intact.hpp"
 #include "tree/remote_edges.hpp"
-#include "tree/sample_rows.hpp"
 #include "tree/unspecified_edges.hpp"
 
 // Lookups of segments that another participant asks for.
@@ -232,55 +232,6 @@ SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
   if (std::all_of(reached.begin(), reached.end(), none)) return found;
   for (auto& one : reached) found.correlations.push_back(std::move(one.correlation));
   return found;
-}
-
-// A dynamic edge is listed with itself twice: what was observed is its sample, and a later one has
-// another error. One that drifts is listed three times: its later error follows from the earlier
-// one.
-template <class Edge>
-std::vector<std::string> marks_of(const Edge& edge, const Name& name) {
-  return {edge.samples().drifts() ? 3U : 2U, std::string(name.text)};
-}
-
-// Adds the edges that each single edge was observed with, after its marks.
-void tell_observed_with(const std::vector<Ends>& edges, Rows rows, SegmentValues& found) {
-  const auto edge_of = [](const Ends& ends) -> const HeldVersion* {
-    const Version* child = ends.a->depth > ends.b->depth ? ends.a : ends.b;
-    return child->held() ? static_cast<const HeldVersion*>(child) : nullptr;
-  };
-  found.correlations.resize(edges.size());
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const HeldVersion* edge = edge_of(edges[i]);
-    if (edge == nullptr) continue;
-    if (edge->moving() && !edge->unsampled()) {
-      auto& with = found.correlations[i].observed_with;
-      with = marks_of(OwnEdge{edge}, *edge->name);
-      if (!found.stamp) continue;
-      const auto others = tell_rows(*edge, i, nanoseconds(*found.stamp), rows, found);
-      std::copy_if(others.begin(), others.end(), std::back_inserter(with),
-                   [&](const std::string& id) { return id != edge->name->text; });
-    } else if (edge->correlation != nullptr) {
-      found.correlations[i].observed_with = edge->correlation->now().observed_with;
-    }
-  }
-}
-
-// Adds the marks of each single edge. @return false: one cannot be read, or has stamps that its
-// owner has made up since then
-bool tell_motion(const std::vector<Ends>& edges, std::optional<Time> timed_since,
-                 RemoteReading& reading, SegmentValues& found) {
-  found.correlations.resize(edges.size());
-  bool all = true;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    for_each_edge(edges[i], reading, [&](const Version& here, const auto& edge) {
-      all = all && edge.version != nullptr;
-      if (!all || !edge.version->moving() || edge.version->unsampled()) return;
-      found.correlations[i].observed_with = marks_of(edge, *here.name);
-      if (!timed_since || edge.version->lacks_sample()) return;
-      all = edge.samples().is_timed_since(nanoseconds(*timed_since), edge.version->number);
-    });
-  }
-  return all;
 }
 
 template <class From>
