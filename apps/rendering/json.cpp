@@ -152,7 +152,7 @@ json joint_json(const JointInfo& joint) {
 
 json history_json(const HistoryInfo& history, std::optional<Time> now) {
   json object{{"id", history.id},
-              {"moving", history.newest.has_value()},
+              {"moving", history.dynamic()},
               {"samples", history.samples},
               {"bytes", history.bytes},
               {"span_limit", seconds(history.span_limit)},

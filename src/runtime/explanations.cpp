@@ -177,7 +177,7 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     if (histories == nullptr || histories->empty()) continue;
     const HistoryInfo& history = histories->front();
     // A static edge is listed if it has rejected samples.
-    if (!history.newest && history.refused_ahead > 0) continue;
+    if (!history.dynamic()) continue;
     owners.dynamic.push_back({edges[i].id, parts[i].partition, history.oldest, history.newest});
   }
   return owners;
