@@ -125,7 +125,7 @@ json partition_json(const PartitionInfo& partition) {
   if (!partition.compatible()) {
     object["reason"] = "incompatible";
   } else if (!partition.reachable) {
-    object["reason"] = partition.stopped ? "stopped" : "lost";
+    object["reason"] = partition.silent ? "silent" : partition.stopped ? "stopped" : "lost";
   }
   return object;
 }

@@ -67,7 +67,9 @@ std::vector<VarianceShare> sorted(std::vector<VarianceShare> shares, double tota
 
 // The partition is absent.
 void blame(const PartitionInfo& absent, Cause& cause) {
-  cause.obstacle = absent.stopped ? Obstacle::kOwnerStopped : Obstacle::kOwnerLost;
+  cause.obstacle = absent.silent    ? Obstacle::kOwnerSilent
+                   : absent.stopped ? Obstacle::kOwnerStopped
+                                    : Obstacle::kOwnerLost;
   cause.partition = absent.name;
   cause.since = absent.since;
   cause.needs = "partition " + quote(absent.name) + " again" +

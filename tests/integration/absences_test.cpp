@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -206,6 +207,26 @@ TEST_CASE("absences: a daemon that was away learns that a partition was forgotte
   const auto partitions = robot.domain.cli({"partitions"});
   CHECK(partitions.out.find("arm") == std::string::npos);
   CHECK_FALSE(client.exists("hand"));
+}
+
+TEST_CASE("absences: a process that starts after an orderly stop is told of no loss") {
+  Robot robot;
+  auto client = Client::open(robot.domain.options()).value();
+  REQUIRE(client.lookup("world", "hand"));
+  robot.arm->signal(SIGTERM);
+  REQUIRE(robot.arm->wait(testing::in_time()));
+  std::set<std::string> reasons;
+  REQUIRE(eventually([&] {
+    const auto lookup = robot.domain.cli({"lookup", "world", "hand"});
+    CHECK(lookup.status == 3);
+    CHECK(lookup.err.find("is lost") == std::string::npos);
+    const auto listed = nlohmann::json::parse(robot.domain.cli({"--json", "partitions"}).out);
+    for (const auto& one : listed.at("partitions")) {
+      if (one.at("name") == "arm") reasons.insert(one.value("reason", "none"));
+    }
+    return lookup.err.find("was stopped") != std::string::npos;
+  }));
+  CHECK(reasons.count("lost") == 0);
 }
 
 TEST_CASE("absences: a daemon is accepted although its clock is behind that of its predecessor") {
