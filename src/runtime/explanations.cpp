@@ -222,7 +222,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
   }
   explain_absent(*edges, cause);
   if (cause.obstacle != Obstacle::kOther) return cause;
-  const Owners owners = owners_of(*edges);
+  Owners owners = owners_of(*edges);
   if (!owners.silent.empty()) {
     cause.obstacle = Obstacle::kOwnerSilent;
     cause.partition = owners.silent;
@@ -237,7 +237,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
     return cause;
   }
   const bool of_time = cause.error.code == Errc::kNotYet || cause.error.code == Errc::kTooOld;
-  if (of_time) explain_time(owners, query, cause);
+  if (of_time) explain_time(std::move(owners), query, cause);
   return cause;
 }
 
@@ -332,13 +332,18 @@ bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {
   return false;
 }
 
-void Explanations::explain_time(const Owners& owners, const WhyQuery& query, Cause& cause) {
+void Explanations::explain_time(Owners owners, const WhyQuery& query, Cause& cause) {
+  // Of edges with one stamp, as a controller sends them, the message names one: it is the first.
+  std::stable_partition(owners.dynamic.begin(), owners.dynamic.end(),
+                        [&](const EdgeHistory& one) { return one.id == cause.error.frame; });
   const EdgeHistory* first_to_end = nullptr;
   const EdgeHistory* last_to_begin = nullptr;
   const EdgeHistory* none = nullptr;
   for (const EdgeHistory& edge : owners.dynamic) {
     if (!edge.newest) {
-      if (none == nullptr) none = &edge;
+      // At the latest common time, one that had no sample yet has its first value.
+      const bool lacks = query.at || edge.id == cause.error.frame;
+      if (none == nullptr && lacks) none = &edge;
       continue;
     }
     if (first_to_end == nullptr || *edge.newest < *first_to_end->newest) first_to_end = &edge;
