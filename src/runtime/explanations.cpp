@@ -16,8 +16,6 @@ namespace {
 
 // How long owners are waited for: for people, who then learn which owner is silent.
 constexpr Milliseconds kPatienceForAnswer{80};
-// Clocks of hosts that differ by more than this are told.
-constexpr std::chrono::milliseconds kClockDiffers{5};
 
 // The edges of a path at one instant.
 class PathEdgesTask final : public Task {
@@ -197,6 +195,7 @@ void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
       age.newest = edge.newest;
     }
     if (age.newest && now) age.age = *now - *age.newest;
+    if (age.age) age.clock_ahead = clock_ahead(name);
     explanation.owners.push_back(std::move(age));
   }
 }
@@ -379,14 +378,16 @@ void Explanations::explain_time(Owners owners, const WhyQuery& query, Cause& cau
               " of partition " + quote(last_to_begin->partition) + " begins");
   }
   if (cause.partition.empty()) return;
-  const auto difference = queries_.clock_difference(cause.partition);
-  if (!difference) return;
-  const std::chrono::nanoseconds ahead = difference->ahead;
-  const bool differs = std::max(ahead, -ahead) > kClockDiffers + difference->error;
-  if (!differs) return;
-  cause.clock_ahead = ahead;
-  cause.needs += "; the clock of its host is " + readable(ahead.count() < 0 ? -ahead : ahead) +
-                 (ahead.count() < 0 ? " behind" : " ahead of") + " the one here";
+  cause.clock_ahead = clock_ahead(cause.partition);
+  if (cause.clock_ahead) cause.needs += "; " + clock_hint(cause.partition, *cause.clock_ahead);
+}
+
+std::optional<std::chrono::nanoseconds> Explanations::clock_ahead(const std::string& partition) {
+  // Of the system's clocks.
+  if (structure_.clock.kind() != ClockKind::kSystem) return std::nullopt;
+  const auto difference = queries_.clock_difference(partition);
+  const bool differs = difference && difference->exceeds(kClockDiffers);
+  return differs ? std::optional(difference->ahead) : std::nullopt;
 }
 
 }  // namespace tfdude
