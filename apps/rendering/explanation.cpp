@@ -55,6 +55,10 @@ nlohmann::json shares_json(const std::vector<VarianceShare>& all) {
   return list;
 }
 
+nlohmann::json count_json(const std::optional<std::chrono::nanoseconds>& duration) {
+  return duration ? nlohmann::json(duration->count()) : nlohmann::json();
+}
+
 nlohmann::json cause_json(const Cause& cause) {
   nlohmann::json json{{"obstacle", to_string(cause.obstacle)},
                       {"frame", cause.frame},
@@ -62,10 +66,9 @@ nlohmann::json cause_json(const Cause& cause) {
                       {"since_ns", ns_json(cause.since)},
                       {"needs", cause.needs},
                       {"similar", cause.similar},
-                      {"clock_ahead_ns", nullptr},
+                      {"clock_ahead_ns", count_json(cause.clock_ahead)},
                       {"code", to_string(cause.error.code)},
                       {"message", cause.error.message}};
-  if (cause.clock_ahead) json["clock_ahead_ns"] = cause.clock_ahead->count();
   return json;
 }
 
@@ -96,6 +99,7 @@ std::string describe(const std::string& a, const std::string& b, const Explanati
     if (owner.age) age += readable(*owner.age) + " old";
     if (!owner.age && owner.newest) age += "of " + readable(*owner.newest);
     text += line(i == 0 ? "owners" : "", owner.partition + age);
+    if (owner.clock_ahead) text += line("", clock_hint(owner.partition, *owner.clock_ahead));
   }
   return text;
 }
@@ -107,7 +111,8 @@ nlohmann::json why_json(const std::string& a, const std::string& b, const Explan
                       {"reachable", one.reachable},
                       {"slowest", one.slowest},
                       {"newest_ns", ns_json(one.newest)},
-                      {"age_ns", one.age ? nlohmann::json(one.age->count()) : nlohmann::json()}});
+                      {"age_ns", count_json(one.age)},
+                      {"clock_ahead_ns", count_json(one.clock_ahead)}});
   }
   nlohmann::json json{{"from", a},
                       {"to", b},

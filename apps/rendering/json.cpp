@@ -125,7 +125,7 @@ json partition_json(const PartitionInfo& partition) {
   if (!partition.compatible()) {
     object["reason"] = "incompatible";
   } else if (!partition.reachable) {
-    object["reason"] = partition.stopped ? "stopped" : "lost";
+    object["reason"] = partition.silent ? "silent" : partition.stopped ? "stopped" : "lost";
   }
   return object;
 }
@@ -152,7 +152,7 @@ json joint_json(const JointInfo& joint) {
 
 json history_json(const HistoryInfo& history, std::optional<Time> now) {
   json object{{"id", history.id},
-              {"moving", history.newest.has_value()},
+              {"moving", history.dynamic()},
               {"samples", history.samples},
               {"bytes", history.bytes},
               {"span_limit", seconds(history.span_limit)},

@@ -33,7 +33,7 @@ struct HistorySum {
 [[nodiscard]] inline HistorySum sum_of(const std::vector<HistoryInfo>& histories) {
   HistorySum sum;
   for (const HistoryInfo& history : histories) {
-    if (history.newest) ++sum.edges;
+    if (history.dynamic()) ++sum.edges;
     sum.samples += history.samples;
     sum.bytes += history.bytes;
   }

@@ -102,6 +102,15 @@ std::string what_was_meant(Source source, const Error& error, const Common& comm
   return similar.empty() ? "" : "did you mean " + joined(similar) + "?";
 }
 
+// That the clock by which ages in a message were found is not the one here; empty: it does not
+// differ.
+std::string clock_of(Source source, const std::string& partition, const Common& common) {
+  if (partition.empty() || common.options.clock != ClockKind::kSystem) return {};
+  const auto difference = source.clock_difference(partition);
+  const bool differs = difference && difference->exceeds(kClockDiffers);
+  return differs ? clock_hint(partition, difference->ahead) : "";
+}
+
 }  // namespace
 
 int answer(const Common& common, const nlohmann::json& json, const std::string& text) {
@@ -163,6 +172,8 @@ Error with_hint(Source source, Error error, const Common& common) {
     hint = "0 is an instant, too: leave --at out for the newest";
   } else if (is_unknown(error.code)) {
     hint = what_was_meant(source, error, common);
+  } else if (error.code == Errc::kNotYet || error.code == Errc::kTooOld) {
+    hint = clock_of(source, error.partition, common);
   }
   if (!hint.empty()) error.message += "; " + hint;
   return error;

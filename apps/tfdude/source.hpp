@@ -36,6 +36,12 @@ class Source {
   /// clock.
   [[nodiscard]] std::optional<Time> end_for(Time stamp) const;
 
+  /// Of live partitions only.
+  [[nodiscard]] Result<ClockDifference> clock_difference(const std::string& partition) const {
+    return live() ? client_->clock_difference(partition)
+                  : fail(Errc::kUnsupported, "a recording has no clock of its own");
+  }
+
   // As the functions of Client.
   [[nodiscard]] Result<std::vector<Frame>> frames() const {
     return live() ? client_->frames() : recording_->frames();

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
+#include <set>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/client/client.hpp"
 #include "tfdude/client/config_preview.hpp"
 #include "tfdude/keys/key_files.hpp"
 
@@ -134,6 +136,39 @@ std::string unspecified_edges(const Config& config) {
             " none until the first sample with a variance, or give a stddev and sample_stddev";
   }
   return text;
+}
+
+std::vector<std::string> links_to_write(const Arguments& arguments, const Config& config) {
+  if (config.urdfs.empty()) return {};
+  auto client = Client::open(arguments.options);
+  const auto frames = client ? client->frames() : Result<std::vector<Frame>>();
+  if (!frames) return {};
+  std::set<std::string> taken;
+  for (const Frame& frame : *frames) {
+    if (frame.partition != config.partition) taken.insert(frame.id);
+  }
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < config.urdfs.size(); ++i) {
+    const UrdfPart& part = config.urdfs[i];
+    const auto left = urdf_without(part, taken);
+    if (!left || (*left && (*left)->links == part.links)) continue;
+    if (!*left) {
+      lines.push_back("leave out " + quote(part.file) + ": others own all of its links");
+      continue;
+    }
+    // Those of the command line come last.
+    const bool typed = i + arguments.urdfs.size() >= config.urdfs.size();
+    std::string links;
+    for (const std::string& entry : (*left)->links) {
+      links += (links.empty() ? "" : typed ? "," : ", ") + printable(entry);
+    }
+    std::string line = "write " + (typed ? "--links " + links : "links: [" + links + "]");
+    if ((*left)->root != part.root) {
+      line += typed ? " and no --root" : " and no root, nor a pose in it";
+    }
+    lines.push_back(line + " for " + quote(part.file));
+  }
+  return lines;
 }
 
 int check(const Arguments& arguments, const Config& config) {

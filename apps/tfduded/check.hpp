@@ -17,6 +17,11 @@ namespace tfdude::daemon {
 /// How many of the edges have no covariance, and what to write; empty if all have one.
 [[nodiscard]] std::string unspecified_edges(const Config& config);
 
+/// What to write, so that the URDFs are without the links whose frames others own: a line for each
+/// of these URDFs; empty if that cannot be found out. Joins the domain.
+[[nodiscard]] std::vector<std::string> links_to_write(const Arguments& arguments,
+                                                      const Config& config);
+
 /// What is wrong with the configurations of a robot's daemons if they run together: a partition, a
 /// frame or a joint of two of them, a parent or a mimicked joint that none has, a cycle. Messages
 /// name the places.

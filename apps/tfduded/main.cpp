@@ -108,6 +108,11 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
   if (!node) {
     spdlog::error("partition {}: {}", tfdude::quote(config->partition), node.error().message);
     const auto code = node.error().code;
+    if (code == tfdude::Errc::kAlreadyExists) {
+      for (const std::string& line : tfdude::daemon::links_to_write(arguments, *config)) {
+        spdlog::error("partition {}: {}", tfdude::quote(config->partition), line);
+      }
+    }
     return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRejected;
   }
   if (const auto line = tfdude::daemon::unspecified_edges(*config); !line.empty()) {

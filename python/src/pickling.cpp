@@ -51,7 +51,8 @@ TFDUDE_MEMBERS(ProtocolVersion, &ProtocolVersion::major, &ProtocolVersion::minor
 TFDUDE_MEMBERS(PartitionInfo, &PartitionInfo::name, &PartitionInfo::host, &PartitionInfo::pid,
                &PartitionInfo::frames, &PartitionInfo::reachable, &PartitionInfo::since,
                &PartitionInfo::stopped, &PartitionInfo::program, &PartitionInfo::protocol,
-               &PartitionInfo::clock, &PartitionInfo::in_memory, &PartitionInfo::why_not_in_memory);
+               &PartitionInfo::clock, &PartitionInfo::in_memory, &PartitionInfo::why_not_in_memory,
+               &PartitionInfo::silent);
 TFDUDE_MEMBERS(Change, &Change::kind, &Change::partition, &Change::frame, &Change::parent,
                &Change::rival, &Change::message, &Change::time, &Change::stopped, &Change::joint);
 TFDUDE_MEMBERS(HistoryInfo, &HistoryInfo::id, &HistoryInfo::samples, &HistoryInfo::bytes,

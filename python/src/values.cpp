@@ -100,6 +100,8 @@ void bind_structure(py::module_& module) {
           "since", [](const PartitionInfo& info) { return from_stamp(info.since); },
           "When `reachable` last changed [ns].")
       .def_readonly("stopped", &PartitionInfo::stopped, "If not reachable: it said that it stops.")
+      .def_readonly("silent", &PartitionInfo::silent,
+                    "If not reachable: others have not said yet if it was stopped or is lost.")
       .def_readonly("program", &PartitionInfo::program, "The version of its program.")
       .def_property_readonly("compatible", &PartitionInfo::compatible)
       .def_property_readonly(

@@ -74,6 +74,7 @@ Result<void> add_urdf(Config& config, const UrdfPart& part) {
   auto ok = check_names(config).and_then([&] { return check_no_cycle(config); });
   if (ok) {
     config.robots.push_back(*std::move(text));
+    config.urdfs.push_back(part);
     return {};
   }
   config.frames.resize(before);

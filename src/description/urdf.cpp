@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -99,6 +100,31 @@ Result<std::vector<FrameSpec>> load_urdf(const UrdfPart& part) {
   const auto text = read_text(part.file);
   if (!text) return tl::unexpected(text.error());
   return parse_urdf(*text, part);
+}
+
+Result<std::optional<UrdfPart>> urdf_without(const UrdfPart& part,
+                                             const std::set<std::string>& taken) {
+  const auto text = read_text(part.file);
+  if (!text) return tl::unexpected(text.error());
+  const std::string file = printable(part.file);
+  const auto read = read_urdf_text(*text, file);
+  if (!read) return tl::unexpected(read.error());
+  const auto tree = build_urdf_tree(*read, file);
+  if (!tree) return tl::unexpected(tree.error());
+  const auto all = select_links(*tree, part.links);
+  if (!all) return tl::unexpected(all.error());
+  std::vector<std::size_t> left;
+  std::copy_if(all->begin(), all->end(), std::back_inserter(left), [&](std::size_t link) {
+    return taken.count(part.prefix + tree->links[link].name) == 0;
+  });
+  if (left.empty()) return std::nullopt;
+  if (left.size() == all->size()) return part;
+  auto entries = entries_for(*tree, left);
+  if (!entries) return tl::unexpected(std::move(entries.error()));
+  UrdfPart rest = part;
+  rest.links = *std::move(entries);
+  if (std::find(left.begin(), left.end(), tree->root) == left.end()) rest.root.clear();
+  return rest;
 }
 
 }  // namespace tfdude

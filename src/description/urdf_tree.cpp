@@ -182,4 +182,41 @@ Result<std::vector<std::size_t>> select_links(const UrdfTree& tree,
   return selected;
 }
 
+Result<std::vector<std::string>> entries_for(const UrdfTree& tree,
+                                             const std::vector<std::size_t>& links) {
+  std::vector<bool> wanted(tree.links.size());
+  for (const std::size_t link : links) wanted[link] = true;
+  // A link above one that is not wanted is an end, so that what else is below it needs entries of
+  // its own.
+  const auto is_end = [&](std::size_t link) {
+    const auto& below = tree.links[link].joints;
+    return std::any_of(below.begin(), below.end(),
+                       [&](std::size_t joint) { return !wanted[tree.joints[joint].child]; });
+  };
+  std::vector<std::string> entries;
+  for (const std::size_t top : links) {
+    const auto& joint = tree.links[top].joint;
+    const std::size_t above = joint ? tree.joints[*joint].parent : top;
+    if (joint && wanted[above] && !is_end(above)) continue;
+    std::string entry = tree.links[top].name;
+    std::vector<std::size_t> waiting{top};
+    while (!waiting.empty()) {
+      const std::size_t link = waiting.back();
+      waiting.pop_back();
+      if (is_end(link)) {
+        entry += ".." + tree.links[link].name;
+        continue;
+      }
+      const auto& below = tree.links[link].joints;
+      for (auto one = below.rbegin(); one != below.rend(); ++one) {
+        waiting.push_back(tree.joints[*one].child);
+      }
+    }
+    entries.push_back(std::move(entry));
+  }
+  auto selected = select_links(tree, entries);
+  if (!selected) return tl::unexpected(std::move(selected.error()));
+  return entries;
+}
+
 }  // namespace tfdude

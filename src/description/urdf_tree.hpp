@@ -48,4 +48,10 @@ struct UrdfTree {
 [[nodiscard]] Result<std::vector<std::size_t>> select_links(
     const UrdfTree& tree, const std::vector<std::string>& entries);
 
+/// The entries that select exactly these links.
+/// @param links  parents before their children
+/// @return kInvalidInput: names have "..", so that no entries do
+[[nodiscard]] Result<std::vector<std::string>> entries_for(const UrdfTree& tree,
+                                                           const std::vector<std::size_t>& links);
+
 }  // namespace tfdude

@@ -41,7 +41,7 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
 
 void Directory::came_back(Known& partition, Owner owner) {
   if (!std::exchange(partition.info.reachable, true)) ++version_;
-  partition.info.stopped = false;
+  partition.info.stopped = partition.info.silent = false;
   partition.forgotten = false;
   // One that was forgotten is told so until it continues with a higher number.
   const auto told = told_absence(partition);
@@ -56,6 +56,7 @@ void Directory::mark_absent(Known& partition, Owner owner, bool stopped, Time no
                             std::chrono::nanoseconds early) {
   if (std::exchange(partition.info.reachable, false)) ++version_;
   partition.info.stopped = stopped;
+  partition.info.silent = false;
   partition.info.since = now;
   absences_.mark_absent(partition.info.name, partition.live, stopped, now, early);
   absences_.teller_gone(partition.info.name);
@@ -87,7 +88,11 @@ bool Directory::look_for_gone(Absences::Steady now) {
   const bool news = looked.counts || !looked.gone.empty();
   if (!news) return false;
   tell_claims();
-  for (Known& partition : partitions_) forget_if_gone(partition, partition.info.since);
+  for (Known& partition : partitions_) {
+    const auto absence = absences_.find(partition.info.name);
+    if (absence && absence->kind != Absent::Kind::kSilent) partition.info.silent = false;
+    forget_if_gone(partition, partition.info.since);
+  }
   return true;
 }
 
@@ -163,9 +168,14 @@ void Directory::hear_of(const Absent& one, const std::string& teller) {
   }
   partition.forgotten = false;
   if (partition.live != 0 || one.kind == Absent::Kind::kBack) return;
+  // Another one may have said already what became of it.
+  const bool is_known = partition.missed_by_others && !partition.info.silent;
   partition.missed_by_others = true;
   partition.info.since = Time(std::chrono::nanoseconds(one.since));
-  partition.info.stopped = one.kind == Absent::Kind::kStopped;
+  if (one.kind != Absent::Kind::kSilent || !is_known) {
+    partition.info.stopped = one.kind == Absent::Kind::kStopped;
+    partition.info.silent = one.kind == Absent::Kind::kSilent;
+  }
   absences_.add_report(one, teller);
   tell_claims();
 }

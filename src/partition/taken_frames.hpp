@@ -10,7 +10,7 @@
 namespace tfdude {
 
 /// Whether no other partition owns one of the frames.
-/// @return kAlreadyExists naming the frames, their owners, and which links of a URDF are left.
+/// @return kAlreadyExists naming the frames and their owners.
 [[nodiscard]] Result<void> check_all_free(const Forest& forest, const Directory& directory,
                                           const std::vector<FrameSpec>& frames);
 

@@ -27,8 +27,8 @@ class FileSource final : public ByteSource {
   [[nodiscard]] Result<void> read(std::uint64_t offset, std::size_t count,
                                   std::string& out) const override {
     if (offset > size_ || count > size_ - offset) {
-      return fail(Errc::kState, quote(file_) + " ends before byte " + std::to_string(offset) +
-                                    " and " + std::to_string(count) + " more");
+      return fail(Errc::kConfig, quote(file_) + " ends before byte " + std::to_string(offset) +
+                                     " and " + std::to_string(count) + " more");
     }
     out.resize(count);
     std::size_t done = 0;
@@ -36,8 +36,8 @@ class FileSource final : public ByteSource {
       const ssize_t got =
           pread(fd_, out.data() + done, count - done, static_cast<off_t>(offset + done));
       if (got < 0 && errno == EINTR) continue;
-      if (got < 0) return fail(Errc::kState, "cannot read " + quote(file_) + ": " + reason());
-      if (got == 0) return fail(Errc::kState, quote(file_) + " has become shorter");
+      if (got < 0) return fail(Errc::kConfig, "cannot read " + quote(file_) + ": " + reason());
+      if (got == 0) return fail(Errc::kConfig, quote(file_) + " has become shorter");
       done += static_cast<std::size_t>(got);
     }
     return {};
@@ -54,18 +54,18 @@ class FileSource final : public ByteSource {
 Result<std::unique_ptr<ByteSource>> open_source(const std::string& file) {
   // A pipe that nobody writes to would wait here otherwise.
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return fail(Errc::kState, "cannot open " + quote(file) + ": " + reason());
+  if (fd < 0) return fail(Errc::kConfig, "cannot open " + quote(file) + ": " + reason());
   struct stat info {};
   if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) {
     close(fd);
-    return fail(Errc::kState, quote(file) + " is not a file");
+    return fail(Errc::kConfig, quote(file) + " is not a file");
   }
   return std::make_unique<FileSource>(file, fd, static_cast<std::uint64_t>(info.st_size));
 }
 
 Result<void> TextSource::read(std::uint64_t offset, std::size_t count, std::string& out) const {
   if (offset > bytes_.size() || count > bytes_.size() - offset) {
-    return fail(Errc::kState, "it ends before byte " + std::to_string(offset));
+    return fail(Errc::kConfig, "it ends before byte " + std::to_string(offset));
   }
   out.assign(bytes_, static_cast<std::size_t>(offset), count);
   return {};

@@ -14,12 +14,12 @@ class ByteSource {
  public:
   virtual ~ByteSource() = default;
   [[nodiscard]] virtual std::uint64_t size() const = 0;
-  /// Replaces the content of `out`. @return kState, also if there are not so many bytes
+  /// Replaces the content of `out`. @return kConfig, also if there are not so many bytes
   [[nodiscard]] virtual Result<void> read(std::uint64_t offset, std::size_t count,
                                           std::string& out) const = 0;
 };
 
-/// A file on disk, with the size that it has now. @return kState, naming it
+/// A file on disk, with the size that it has now. @return kConfig, naming it
 [[nodiscard]] Result<std::unique_ptr<ByteSource>> open_source(const std::string& file);
 
 /// Bytes in memory.

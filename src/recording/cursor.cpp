@@ -40,10 +40,10 @@ Result<Cursor> Cursor::open(std::unique_ptr<ByteSource> source) {
   if (cursor.foreign_ && !cursor.peek()) {
     const std::size_t known = cursor.reader_.problems().size();
     if (cursor.problems_.size() > known) {
-      return fail(Errc::kState, "nothing of it can be read: " + cursor.problems_[known]);
+      return fail(Errc::kConfig, "nothing of it can be read: " + cursor.problems_[known]);
     }
     if (cursor.topics_.empty()) {
-      return fail(Errc::kState,
+      return fail(Errc::kConfig,
                   "it has no transforms: neither a recording of tf-dude nor /tf of ROS");
     }
   }

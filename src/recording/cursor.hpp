@@ -25,7 +25,7 @@ inline constexpr const char* kForeignPartition = "ros";
 /// @par Memory  One chunk; two while it reads ahead.
 class Cursor {
  public:
-  /// @return as McapReader::open(); kState: there is nothing in it that could be read
+  /// @return as McapReader::open(); kConfig: there is nothing in it that could be read
   [[nodiscard]] static Result<Cursor> open(std::unique_ptr<ByteSource> source);
 
   [[nodiscard]] const McapReader& reader() const { return reader_; }

@@ -86,7 +86,7 @@ Result<std::string_view> McapReader::body(const Record& record) {
 
 Result<void> McapReader::read_header() {
   const auto magic = window_->at(0, kMagic.size());
-  if (!magic || *magic != kMagic) return fail(Errc::kState, "it is no MCAP file");
+  if (!magic || *magic != kMagic) return fail(Errc::kConfig, "it is no MCAP file");
   const auto record = record_at(kMagic.size(), source_->size());
   if (!record) return tl::unexpected(record.error());
   data_begin_ = kMagic.size();
@@ -164,7 +164,7 @@ Result<void> McapReader::read(const ChunkPlace& chunk, const Visit& visit) {
   const std::string_view compression = reader.text();
   const std::string_view packed = reader.bytes(reader.u64());
   if (!reader.good() || op != Op::kChunk || length != bytes.size() - kRecordHead) {
-    return fail(Errc::kState, where + " is damaged");
+    return fail(Errc::kConfig, where + " is damaged");
   }
   if (raw_size > kMaxChunkBytes) {
     return fail(Errc::kTooMuch, where + " has " + std::to_string(raw_size) + " bytes");
@@ -180,8 +180,8 @@ Result<void> McapReader::read(const ChunkPlace& chunk, const Visit& visit) {
     return fail(Errc::kUnsupported,
                 where + " is compressed with " + quote(compression) + "; only zstd can be read");
   }
-  if (raw.size() != raw_size) return fail(Errc::kState, where + " has another size than it says");
-  if (crc != 0 && crc32(raw) != crc) return fail(Errc::kState, where + " has a wrong CRC");
+  if (raw.size() != raw_size) return fail(Errc::kConfig, where + " has another size than it says");
+  if (crc != 0 && crc32(raw) != crc) return fail(Errc::kConfig, where + " has a wrong CRC");
   return visit_records(raw, visit);
 }
 
@@ -190,7 +190,7 @@ Result<void> McapReader::visit_records(std::string_view records, const Visit& vi
   while (reader.left() > 0) {
     const auto op = static_cast<Op>(reader.u8());
     const std::string_view bytes = reader.bytes(reader.u64());
-    if (!reader.good()) return fail(Errc::kState, "a record reaches beyond the end of its chunk");
+    if (!reader.good()) return fail(Errc::kConfig, "a record reaches beyond the end of its chunk");
     if (op == Op::kSchema || op == Op::kChannel) {
       if (auto ok = read_names(op, bytes); !ok) return ok;
       continue;
@@ -202,7 +202,7 @@ Result<void> McapReader::visit_records(std::string_view records, const Visit& vi
     (void)fields.u32();  // sequence number
     message.log_time = fields.number<std::int64_t>();
     message.publish_time = fields.number<std::int64_t>();
-    if (!fields.good()) return fail(Errc::kState, "a message is shorter than its fields");
+    if (!fields.good()) return fail(Errc::kConfig, "a message is shorter than its fields");
     message.data = fields.bytes(fields.left());
     if (!visit(message)) return {};
   }

@@ -38,7 +38,7 @@ class McapReader {
   static constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 24U;
   static constexpr std::uint64_t kMaxNamesBytes = std::uint64_t{1} << 26U;
 
-  /// @return kState: it cannot be read, or is no MCAP file; kTooMuch: it exceeds a limit
+  /// @return kConfig: it cannot be read, or is no MCAP file; kTooMuch: it exceeds a limit
   [[nodiscard]] static Result<McapReader> open(std::unique_ptr<ByteSource> source);
 
   /// Sorted by their place in the file.
@@ -59,7 +59,7 @@ class McapReader {
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
   /// Calls a function for each message of a chunk, in order; it returns whether to go on.
-  /// @return kState: the chunk is damaged (nothing of it was visited) or ends early; kUnsupported:
+  /// @return kConfig: the chunk is damaged (nothing of it was visited) or ends early; kUnsupported:
   ///   its compression; kTooMuch: its size
   using Visit = std::function<bool(const Message&)>;
   [[nodiscard]] Result<void> read(const ChunkPlace& chunk, const Visit& visit);

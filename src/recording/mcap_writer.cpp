@@ -158,7 +158,7 @@ Result<void> McapWriter::flush() {
   const std::string_view packed =
       settings_.compress ? compressor_.compress(chunk_) : std::string_view(chunk_);
   if (packed.empty()) {
-    state_ = fail(Errc::kState, "no memory to compress a chunk");
+    state_ = fail(Errc::kInvalidInput, "no memory to compress a chunk");
     return state_;
   }
   std::string bytes;

@@ -17,7 +17,7 @@ constexpr std::size_t kLeastKept = 4 + 8;
 constexpr std::size_t kLeastJoint = 4 + 4 + 2 + 8 + 4 + 4 + 4 + 32;
 
 tl::unexpected<Error> invalid(const char* what) {
-  return fail(Errc::kState, std::string("a message is not a valid one of ") + what);
+  return fail(Errc::kConfig, std::string("a message is not a valid one of ") + what);
 }
 
 // Instead of a stamp.

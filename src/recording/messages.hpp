@@ -108,7 +108,7 @@ class ValuesDecoder {
   explicit ValuesDecoder(EdgeTable& edges) : edges_(&edges) {}
 
   /// @param out  replaced, so that its memory can be used again; of no use after an error
-  /// @return kState: not a valid message; values that are not valid are left out
+  /// @return kConfig: not a valid message; values that are not valid are left out
   [[nodiscard]] Result<void> decode(std::string_view message, RecordedValues& out);
 
  private:
@@ -129,7 +129,7 @@ void encode(const RecordedJoints& joints, std::string& out);
 void encode(const Change& change, std::string& out);
 void encode_keyframe(bool ends, std::string& out);
 
-/// @return kState: not a valid message
+/// @return kConfig: not a valid message
 [[nodiscard]] Result<RecordedFrames> decode_frames(std::string_view message);
 [[nodiscard]] Result<RecordedJoints> decode_joints(std::string_view message);
 [[nodiscard]] Result<Change> decode_event(std::string_view message);
@@ -142,7 +142,7 @@ struct RecordedTransforms {
   TransformCounts counts;             ///< of these
 };
 
-/// By the rules of the bridge to ROS. @return kState: not a valid message
+/// By the rules of the bridge to ROS. @return kConfig: not a valid message
 /// @param edges  as of ValuesDecoder
 [[nodiscard]] Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges);
 

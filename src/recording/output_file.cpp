@@ -11,7 +11,7 @@ namespace tfdude::recording {
 namespace {
 
 tl::unexpected<Error> failed(const std::string& name, int reason) {
-  return fail(Errc::kState,
+  return fail(reason == EEXIST ? Errc::kAlreadyExists : Errc::kInvalidInput,
               "cannot write " + quote(name) + ": " + std::generic_category().message(reason));
 }
 

@@ -11,13 +11,13 @@ namespace tfdude::recording {
 /// A new file that only grows. If bytes cannot be written, all of that call are removed again.
 class OutputFile {
  public:
-  /// @return kState: it exists, or cannot be created
+  /// @return kAlreadyExists; kInvalidInput: it cannot be created
   [[nodiscard]] static Result<std::unique_ptr<OutputFile>> create(const std::string& name);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// @return kState, naming the file and the reason
+  /// @return kInvalidInput, naming the file and the reason
   [[nodiscard]] Result<void> write(std::string_view bytes);
 
  private:

@@ -68,7 +68,7 @@ Result<RecordedTransforms> decode_tf(std::string_view message, EdgeTable& edges)
     all.values.push_back(std::move(recorded));
   }
   if (!reader.good()) {
-    return fail(Errc::kState, "a message is not a valid one of " + std::string("transforms"));
+    return fail(Errc::kConfig, "a message is not a valid one of " + std::string("transforms"));
   }
   return all;
 }

@@ -28,15 +28,15 @@ std::string_view Compressor::compress(std::string_view raw) {
 Result<std::string> decompress(std::string_view bytes, std::size_t size) {
   const unsigned long long said = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
   if (said == ZSTD_CONTENTSIZE_ERROR || (said != ZSTD_CONTENTSIZE_UNKNOWN && said > size)) {
-    return fail(Errc::kState, "is not compressed as it says");
+    return fail(Errc::kConfig, "is not compressed as it says");
   }
   std::string raw(size, '\0');
   const std::size_t found = ZSTD_decompress(raw.data(), raw.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(found) != 0) {
-    return fail(Errc::kState, std::string("zstd: ") + ZSTD_getErrorName(found));
+    return fail(Errc::kConfig, std::string("zstd: ") + ZSTD_getErrorName(found));
   }
   if (found != size) {
-    return fail(Errc::kState,
+    return fail(Errc::kConfig,
                 "has " + std::to_string(found) + " bytes instead of " + std::to_string(size));
   }
   return raw;

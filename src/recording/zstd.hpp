@@ -29,7 +29,7 @@ class Compressor {
 };
 
 /// @param size  of the result, which is all that is allocated
-/// @return kState: the bytes are damaged, or of another size
+/// @return kConfig: the bytes are damaged, or of another size
 [[nodiscard]] Result<std::string> decompress(std::string_view bytes, std::size_t size);
 
 }  // namespace tfdude::recording

@@ -16,8 +16,6 @@ namespace {
 
 // How long owners are waited for: for people, who then learn which owner is silent.
 constexpr Milliseconds kPatienceForAnswer{80};
-// Clocks of hosts that differ by more than this are told.
-constexpr std::chrono::milliseconds kClockDiffers{5};
 
 // The edges of a path at one instant.
 class PathEdgesTask final : public Task {
@@ -67,7 +65,9 @@ std::vector<VarianceShare> sorted(std::vector<VarianceShare> shares, double tota
 
 // The partition is absent.
 void blame(const PartitionInfo& absent, Cause& cause) {
-  cause.obstacle = absent.stopped ? Obstacle::kOwnerStopped : Obstacle::kOwnerLost;
+  cause.obstacle = absent.silent    ? Obstacle::kOwnerSilent
+                   : absent.stopped ? Obstacle::kOwnerStopped
+                                    : Obstacle::kOwnerLost;
   cause.partition = absent.name;
   cause.since = absent.since;
   cause.needs = "partition " + quote(absent.name) + " again" +
@@ -177,7 +177,7 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     if (histories == nullptr || histories->empty()) continue;
     const HistoryInfo& history = histories->front();
     // A static edge is listed if it has rejected samples.
-    if (!history.newest && history.refused_ahead > 0) continue;
+    if (!history.dynamic()) continue;
     owners.dynamic.push_back({edges[i].id, parts[i].partition, history.oldest, history.newest});
   }
   return owners;
@@ -195,6 +195,7 @@ void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
       age.newest = edge.newest;
     }
     if (age.newest && now) age.age = *now - *age.newest;
+    if (age.age) age.clock_ahead = clock_ahead(name);
     explanation.owners.push_back(std::move(age));
   }
 }
@@ -220,7 +221,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
   }
   explain_absent(*edges, cause);
   if (cause.obstacle != Obstacle::kOther) return cause;
-  const Owners owners = owners_of(*edges);
+  Owners owners = owners_of(*edges);
   if (!owners.silent.empty()) {
     cause.obstacle = Obstacle::kOwnerSilent;
     cause.partition = owners.silent;
@@ -235,7 +236,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
     return cause;
   }
   const bool of_time = cause.error.code == Errc::kNotYet || cause.error.code == Errc::kTooOld;
-  if (of_time) explain_time(owners, query, cause);
+  if (of_time) explain_time(std::move(owners), query, cause);
   return cause;
 }
 
@@ -330,13 +331,18 @@ bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {
   return false;
 }
 
-void Explanations::explain_time(const Owners& owners, const WhyQuery& query, Cause& cause) {
+void Explanations::explain_time(Owners owners, const WhyQuery& query, Cause& cause) {
+  // Of edges with one stamp, as a controller sends them, the message names one: it is the first.
+  std::stable_partition(owners.dynamic.begin(), owners.dynamic.end(),
+                        [&](const EdgeHistory& one) { return one.id == cause.error.frame; });
   const EdgeHistory* first_to_end = nullptr;
   const EdgeHistory* last_to_begin = nullptr;
   const EdgeHistory* none = nullptr;
   for (const EdgeHistory& edge : owners.dynamic) {
     if (!edge.newest) {
-      if (none == nullptr) none = &edge;
+      // At the latest common time, one that had no sample yet has its first value.
+      const bool lacks = query.at || edge.id == cause.error.frame;
+      if (none == nullptr && lacks) none = &edge;
       continue;
     }
     if (first_to_end == nullptr || *edge.newest < *first_to_end->newest) first_to_end = &edge;
@@ -372,14 +378,16 @@ void Explanations::explain_time(const Owners& owners, const WhyQuery& query, Cau
               " of partition " + quote(last_to_begin->partition) + " begins");
   }
   if (cause.partition.empty()) return;
-  const auto difference = queries_.clock_difference(cause.partition);
-  if (!difference) return;
-  const std::chrono::nanoseconds ahead = difference->ahead;
-  const bool differs = std::max(ahead, -ahead) > kClockDiffers + difference->error;
-  if (!differs) return;
-  cause.clock_ahead = ahead;
-  cause.needs += "; the clock of its host is " + readable(ahead.count() < 0 ? -ahead : ahead) +
-                 (ahead.count() < 0 ? " behind" : " ahead of") + " the one here";
+  cause.clock_ahead = clock_ahead(cause.partition);
+  if (cause.clock_ahead) cause.needs += "; " + clock_hint(cause.partition, *cause.clock_ahead);
+}
+
+std::optional<std::chrono::nanoseconds> Explanations::clock_ahead(const std::string& partition) {
+  // Of the system's clocks.
+  if (structure_.clock.kind() != ClockKind::kSystem) return std::nullopt;
+  const auto difference = queries_.clock_difference(partition);
+  const bool differs = difference && difference->exceeds(kClockDiffers);
+  return differs ? std::optional(difference->ahead) : std::nullopt;
 }
 
 }  // namespace tfdude

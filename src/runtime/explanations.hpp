@@ -56,7 +56,9 @@ class Explanations {
   [[nodiscard]] bool explain_missed(const std::string& a, const std::string& b, Cause& cause);
   [[nodiscard]] std::optional<FrameInfo> top_of(const std::string& id) const;
   void explain_absent(const std::vector<FrameInfo>& edges, Cause& cause);
-  void explain_time(const Owners& owners, const WhyQuery& query, Cause& cause);
+  void explain_time(Owners owners, const WhyQuery& query, Cause& cause);
+  /// Absent: it does not differ, or that is not known.
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> clock_ahead(const std::string& partition);
   [[nodiscard]] bool has_other_clock(const Owners& owners, Cause& cause);
   [[nodiscard]] std::string owner_name(Owner owner);
   [[nodiscard]] std::vector<std::string> names_like(const std::string& id);

@@ -17,12 +17,13 @@ HistoryInfo history_of(const HeldVersion& edge) {
     info.refused_equal = refused->equal.load(std::memory_order_relaxed);
     info.refused_ahead = refused->ahead.load(std::memory_order_relaxed);
   }
-  if (edge.samples == nullptr) return info;
+  // Settings alone, of which some are for samples that may come, make no edge dynamic.
+  if (edge.samples == nullptr || !edge.moving()) return info;
   const SampleHistory& samples = *edge.samples;
   info.span_limit = samples.timing().span;
   info.count_limit = samples.timing().count;
   info.bytes = samples.bytes();
-  if (!edge.moving() || edge.lacks_sample()) return info;
+  if (edge.lacks_sample()) return info;
   info.bytes += samples.bytes_until(edge.number);
   double sum = 0;
   double squares = 0;
@@ -344,7 +345,7 @@ std::vector<HistoryInfo> Forest::histories(std::string_view id) const {
     const auto& edge = static_cast<const HeldVersion&>(*version);
     const Refused* refused = edge.name->refused.counts();
     const bool ahead = refused != nullptr && refused->ahead.load(std::memory_order_relaxed) > 0;
-    if (edge.samples != nullptr || ahead) all.push_back(history_of(edge));
+    if (edge.moving() || ahead) all.push_back(history_of(edge));
   };
   if (!id.empty()) {
     add(impl_->frames_.present(id, commit));

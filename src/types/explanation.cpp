@@ -1,6 +1,13 @@
 #include "tfdude/types/explanation.hpp"
 
+#include "tfdude/base/id.hpp"
+
 namespace tfdude {
+
+std::string clock_hint(const std::string& partition, std::chrono::nanoseconds ahead) {
+  return "the clock of partition " + quote(partition) + " is " + readable(std::chrono::abs(ahead)) +
+         (ahead.count() < 0 ? " behind" : " ahead of") + " the one here";
+}
 
 const char* to_string(Obstacle obstacle) {
   switch (obstacle) {

@@ -244,6 +244,52 @@ TEST_CASE("why: injected causes are named, in time for people") {
 #endif
 }
 
+TEST_CASE("why: of edges with one stamp it names the one that its message names") {
+  Random random(4612);
+  const auto join = testing::join_loopback();
+  Robot robot(join, random);
+  auto client = Client::open(join(""));
+  REQUIRE(client);
+  REQUIRE(client->frames());
+  const auto check = [&](const std::string& a, const std::string& b, std::optional<Time> at) {
+    WhyQuery query;
+    query.at = at;
+    const Explanation why = client->why(a, b, query);
+    REQUIRE(why.cause);
+    INFO(a << " to " << b << ": " << why.cause->error.message << "; " << why.cause->needs);
+    CHECK_FALSE(why.cause->error.frame.empty());
+    CHECK(why.cause->frame == why.cause->error.frame);
+    CHECK_THAT(why.cause->needs, ContainsSubstring("'" + why.cause->frame + "'"));
+  };
+  const auto check_all = [&](std::optional<Time> at) {
+    for (int k = 0; k < kOwners; ++k) {
+      check(Robot::frame(0, 0), Robot::frame(k, kFramesEach - 1), at);
+      check(Robot::frame(k, kFramesEach - 1), Robot::frame(0, 0), at);
+    }
+  };
+  check_all(instant(20));  // none has a sample
+  robot.move(0, 50);
+  check_all(instant(70));
+  check_all(instant(-20));
+}
+
+TEST_CASE("why: an edge without a sample is no cause if its first value holds") {
+  Random random(4613);
+  const auto join = testing::join_loopback();
+  Robot robot(join, random);
+  // The pivot has no sample; the two others have no instant in common.
+  REQUIRE(robot.nodes["owner1"]->update("middle_slider", Transform::exact({}), instant(0)));
+  REQUIRE(robot.nodes["owner1"]->update("middle_bracket", Transform::exact({}), instant(50)));
+  auto client = Client::open(join(""));
+  REQUIRE(client);
+  REQUIRE(client->frames());
+  const Explanation why = client->why("middle_plate", "middle_flange");
+  REQUIRE(why.cause);
+  INFO(why.cause->error.message << "; " << why.cause->needs);
+  CHECK(why.cause->obstacle == Obstacle::kNoCommonInstant);
+  CHECK(why.cause->frame != "middle_pivot");
+}
+
 TEST_CASE("why: an owner that hangs is named, soon") {
   Random random(4611);
   const auto join = testing::join_loopback();

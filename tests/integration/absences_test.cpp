@@ -1,9 +1,11 @@
 // Partitions that are gone for good, and those that come back: with real daemons.
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -206,6 +208,58 @@ TEST_CASE("absences: a daemon that was away learns that a partition was forgotte
   const auto partitions = robot.domain.cli({"partitions"});
   CHECK(partitions.out.find("arm") == std::string::npos);
   CHECK_FALSE(client.exists("hand"));
+}
+
+TEST_CASE("absences: a process that starts after an orderly stop is told of no loss") {
+  Robot robot;
+  auto client = Client::open(robot.domain.options()).value();
+  REQUIRE(client.lookup("world", "hand"));
+  robot.arm->signal(SIGTERM);
+  REQUIRE(robot.arm->wait(testing::in_time()));
+  std::set<std::string> reasons;
+  REQUIRE(eventually([&] {
+    const auto lookup = robot.domain.cli({"lookup", "world", "hand"});
+    CHECK(lookup.status == 3);
+    CHECK(lookup.err.find("is lost") == std::string::npos);
+    const auto listed = nlohmann::json::parse(robot.domain.cli({"--json", "partitions"}).out);
+    for (const auto& one : listed.at("partitions")) {
+      if (one.at("name") == "arm") reasons.insert(one.value("reason", "none"));
+    }
+    return lookup.err.find("was stopped") != std::string::npos;
+  }));
+  CHECK(reasons.count("lost") == 0);
+}
+
+TEST_CASE("absences: ages by a clock that is an hour behind are said to be so") {
+  const std::string fake = TFDUDE_FAKETIME;
+  if (!std::filesystem::exists(fake)) {
+    WARN("SKIPPED: needs the package faketime");
+    return;
+  }
+  Robot robot;
+  robot.arm->kill();
+  robot.arm.emplace(robot.start(
+      robot.arm_config,
+      {"/usr/bin/env", "FAKETIME=-1h", "FAKETIME_DONT_FAKE_MONOTONIC=1", "LD_PRELOAD=" + fake}));
+  auto client = Client::open(robot.domain.options()).value();
+  const Time then =
+      std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()) -
+      std::chrono::hours(1);
+  REQUIRE(eventually([&] { return client.update("hand", along_x(1), then).has_value(); }));
+  const std::string hint = "the clock of partition 'arm' is ";
+  const auto says = [&](const std::vector<std::string>& args, const std::string& text) {
+    const auto result = robot.domain.cli(args);
+    INFO(result.out << result.err);
+    CHECK_THAT(result.out + result.err, ContainsSubstring(text));
+  };
+  says({"lookup", "world", "hand", "--at", "-0.5"}, hint);
+  says({"why", "world", "hand", "--at", "-0.5"}, hint);
+  says({"why", "world", "hand"}, hint);
+  const auto why = nlohmann::json::parse(robot.domain.cli({"--json", "why", "world", "hand"}).out);
+  for (const auto& owner : why.at("owners")) {
+    INFO(owner.dump());
+    CHECK(owner.at("clock_ahead_ns").is_null() == (owner.at("partition") == "base"));
+  }
 }
 
 TEST_CASE("absences: a daemon is accepted although its clock is behind that of its predecessor") {

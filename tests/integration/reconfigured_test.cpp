@@ -272,10 +272,41 @@ TEST_CASE("reconfigured: a daemon says who owns the links that it cannot have") 
   const CliResult refused = finish(second);
   CHECK(refused.status == 1);
   CHECK_THAT(refused.err, ContainsSubstring("frame 'hand' belongs to partition 'arm'") &&
-                              ContainsSubstring("links: [base..torso, head]"));
+                              ContainsSubstring("write --links base..torso,head for '"));
   Process third = domain.start_daemon(
       {"--partition", "body", "--urdf", urdf, "--links", "base..torso,head", "--no-state"});
   CHECK_THAT(await_ready(third), ContainsSubstring("frames=3"));
+}
+
+TEST_CASE(
+    "reconfigured: what a daemon says to write keeps its links, and has no root without one") {
+  const TestDomain domain;
+  const TemporaryDirectory directory;
+  const std::string urdf = directory.write("robot.urdf", R"(<robot name="r">
+  <link name="base"/> <link name="torso"/> <link name="hand"/> <link name="head"/>
+  <joint name="a" type="fixed"><parent link="base"/><child link="torso"/></joint>
+  <joint name="b" type="fixed"><parent link="torso"/><child link="hand"/></joint>
+  <joint name="c" type="fixed"><parent link="torso"/><child link="head"/></joint>
+</robot>)");
+  const auto config = [&](const std::string& links, const std::string& root) {
+    return directory.write(
+        "body.yaml", "partition: body\nframes: [{id: lamp}]\nurdf:\n  - {file: " + urdf + ", " +
+                         root + "links: [" + links + "]}\n");
+  };
+  const auto body = [&](const std::string& file) {
+    return domain.start_daemon({"--config", file, "--no-state"});
+  };
+  Process base = domain.start_daemon(
+      {"--partition", "base", "--urdf", urdf, "--links", "base..base", "--no-state"});
+  REQUIRE(!await_ready(base).empty());
+  Process second = body(config("base..torso, head", "root: lamp, xyz: [1, 0, 0], "));
+  CHECK_THAT(finish(second).err,
+             ContainsSubstring("write links: [torso..torso, head] and no root, nor a pose in it"));
+  Process third = body(config("torso..torso, head", ""));
+  CHECK_THAT(await_ready(third), ContainsSubstring("frames=3"));
+  Process fourth = domain.start_daemon(
+      {"--partition", "other", "--urdf", urdf, "--links", "head", "--no-state"});
+  CHECK_THAT(finish(fourth).err, ContainsSubstring("others own all of its links"));
 }
 
 TEST_CASE("reconfigured: correlations from observations and requests survive a kill") {

@@ -233,9 +233,11 @@ TEST_CASE("record: wrong usage and unreadable files are refused") {
   const testing::TestDomain domain;
   const TemporaryDirectory directory;
   const std::string text = directory.write("text.mcap", "no recording");
-  CHECK(domain.cli({"info", text}).status == 1);
+  CHECK(domain.cli({"info", text}).status == 2);
   CHECK_THAT(domain.cli({"tree", "--recording", text}).err, ContainsSubstring("MCAP"));
-  CHECK(domain.cli({"info", directory.path() + "/none"}).status == 1);
+  const CliResult none = domain.cli({"--json", "info", directory.path() + "/none"});
+  CHECK(none.status == 2);
+  CHECK(json::parse(none.out).at("error").at("code") == "config");
   CHECK(domain.cli({"tree", "--at", "5"}).status == 2);
   CHECK(domain.cli({"record"}).status == 2);
   CHECK(domain.cli({"record", directory.path() + "/x", "--split-size", "0"}).status == 2);

@@ -12,9 +12,12 @@ namespace {
 using nlohmann::json;
 
 json met_json(const Met& met) {
-  json object{{"partition", met.partition.name}, {"host", nullptr},
-              {"pid", nullptr},                  {"reachable", met.partition.reachable},
-              {"clock_ahead_s", nullptr},        {"clock_error_s", nullptr}};
+  json object{{"partition", met.partition.name},
+              {"host", nullptr},
+              {"pid", nullptr},
+              {"reachable", met.partition.reachable},
+              {"clock_ahead_s", nullptr},
+              {"clock_error_s", nullptr}};
   if (!met.partition.host.empty()) {
     object["host"] = met.partition.host;
     object["pid"] = met.partition.pid;
@@ -33,8 +36,8 @@ json met_json(const Met& met) {
 std::string met_text(const Met& met) {
   const PartitionInfo& partition = met.partition;
   if (!partition.reachable && partition.compatible()) {
-    return format("%-12s ", partition.stopped ? "stopped" : "lost") + partition.name + ", since " +
-           to_string(partition.since) + "\n";
+    const char* how = partition.silent ? "silent" : partition.stopped ? "stopped" : "lost";
+    return format("%-12s ", how) + partition.name + ", since " + to_string(partition.since) + "\n";
   }
   std::string text = "met          " + partition.name + " on " + partition.host + ", process " +
                      std::to_string(partition.pid);

@@ -50,9 +50,11 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
       text += "  lookups ask it over DDS: " + partition.why_not_in_memory + "\n";
     }
     if (partition.reachable) continue;
+    const char* why = partition.silent    ? "  silent since "
+                      : partition.stopped ? "  stopped since "
+                                          : "  lost since ";
     text += painted(partition.stopped ? Look::kWarning : Look::kBad,
-                    (partition.stopped ? "  stopped since " : "  lost since ") +
-                        to_string(partition.since) + "\n");
+                    why + to_string(partition.since) + "\n");
   }
   return text;
 }

@@ -328,7 +328,7 @@ struct ReplayCommand final : Command {
     auto recording = Recording::open(file);
     if (!recording) return report(recording.error(), common);
     if (recording->partitions().empty()) {
-      return report({Errc::kState, quote(file) + " has no partition"}, common);
+      return report({Errc::kUnknownPartition, quote(file) + " has no partition"}, common);
     }
     const auto from = optional_stamp(Source(*recording), at);
     if (!from) return report(from.error(), common);

@@ -21,6 +21,7 @@ struct Config {
   std::vector<FrameSpec> frames;
   std::vector<std::string> places;  ///< where each of the frames is described, for messages
   std::vector<std::string> robots;  ///< the text of each URDF
+  std::vector<UrdfPart> urdfs;      ///< that were read, as many
 };
 
 /// Reads a YAML file and the URDF files that it names.

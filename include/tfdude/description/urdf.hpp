@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -55,5 +56,13 @@ struct UrdfPart {
 /// As load_urdf(), from text; part.file stands for the file in messages.
 [[nodiscard]] TFDUDE_EXPORT Result<std::vector<FrameSpec>> parse_urdf(const std::string& text,
                                                                       const UrdfPart& part);
+
+/// The part without the links whose frames others own: what is left for a daemon beside them. It is
+/// without `root` if the robot's root link is not left.
+/// @param taken  ids of frames, so with the prefix
+/// @return nothing if no link is left; errors of load_urdf(); kInvalidInput: names of links have
+///   "..", so that no entries say it
+[[nodiscard]] TFDUDE_EXPORT Result<std::optional<UrdfPart>> urdf_without(
+    const UrdfPart& part, const std::set<std::string>& taken);
 
 }  // namespace tfdude

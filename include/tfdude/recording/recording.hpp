@@ -63,7 +63,7 @@ class TFDUDE_EXPORT Recording {
  public:
   /// Opens an MCAP file, also one that was not finished or is damaged in places: what can be read
   /// is read. Shows the end of the recording.
-  /// @return kState: it cannot be read, or has no transforms; kTooMuch: it exceeds a limit
+  /// @return kConfig: it cannot be read, or has no transforms; kTooMuch: it exceeds a limit
   [[nodiscard]] static Result<Recording> open(const std::string& file);
   /// The same of bytes in memory.
   [[nodiscard]] static Result<Recording> read(std::string_view bytes);

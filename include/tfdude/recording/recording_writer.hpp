@@ -33,7 +33,7 @@ struct RecordingOptions {
 /// @par Thread safety  One thread at a time.
 class TFDUDE_EXPORT RecordingWriter {
  public:
-  /// Creates the file. @return kState: it exists, or cannot be written
+  /// Creates the file. @return kAlreadyExists; kInvalidInput: it cannot be written
   [[nodiscard]] static Result<RecordingWriter> create(const std::string& file, Time now,
                                                       const RecordingOptions& options = {});
   RecordingWriter(const RecordingWriter&) = delete;

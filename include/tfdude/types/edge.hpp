@@ -84,7 +84,7 @@ struct EdgeTiming {
   std::size_t restart_after = 5;
 };
 
-/// Statistics of one edge's stored history.
+/// Statistics of one edge's stored history. Of a static edge no more than its rejected samples.
 struct HistoryInfo {
   std::string id;
   std::size_t samples = 0;
@@ -99,6 +99,9 @@ struct HistoryInfo {
   std::uint64_t refused_old = 0;       ///< samples rejected: older than the kept history
   std::uint64_t refused_equal = 0;     ///< samples rejected: stamp of another sample
   std::uint64_t refused_ahead = 0;     ///< samples rejected: too far ahead of the owner's clock
+
+  /// Whether the edge is dynamic. It may have no sample yet, or none any more.
+  [[nodiscard]] bool dynamic() const { return count_limit > 0; }
 };
 
 /// What observations have shown so far about one edge's covariance.

@@ -34,6 +34,13 @@ enum class Obstacle : std::uint8_t {
 /// "unknown_frame", ...
 [[nodiscard]] TFDUDE_EXPORT const char* to_string(Obstacle obstacle);
 
+/// Clocks of hosts that differ by more than this are told beside times.
+inline constexpr std::chrono::milliseconds kClockDiffers{5};
+
+/// "the clock of partition 'arm' is 3.000 s ahead of the one here".
+[[nodiscard]] TFDUDE_EXPORT std::string clock_hint(const std::string& partition,
+                                                   std::chrono::nanoseconds ahead);
+
 /// Why there is no answer.
 struct Cause {
   Obstacle obstacle = Obstacle::kOther;
@@ -68,6 +75,8 @@ struct OwnerAge {
   std::optional<Time> newest{};  ///< of that edge; absent: all of its edges are static
   /// How long ago that was, by this participant's clock; absent: that has no time, or `newest`.
   std::optional<std::chrono::nanoseconds> age{};
+  /// How far the clock of its host is ahead of the one here, if they differ: then ages mislead.
+  std::optional<std::chrono::nanoseconds> clock_ahead{};
 };
 
 /// Why an answer is as it is.

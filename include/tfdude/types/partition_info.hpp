@@ -17,8 +17,11 @@ struct PartitionInfo {
   std::uint32_t pid = 0;
   std::size_t frames = 0;
   bool reachable = false;
-  Time since{};           ///< when `reachable` last changed, by the caller's clock
-  bool stopped = false;   ///< if not reachable: it announced its stop; otherwise it was lost
+  Time since{};          ///< when `reachable` last changed, by the caller's clock
+  bool stopped = false;  ///< if not reachable: it announced its stop; otherwise it was lost
+  /// If not reachable: others have only said that it is silent. They say within a second whether it
+  /// was stopped or is lost.
+  bool silent = false;
   std::string program{};  ///< the version of its program; empty: not known
   ProtocolVersion protocol = kProtocolVersion;
   std::optional<ClockKind> clock{};  ///< that its stamps are of; absent: not known (yet)
@@ -30,8 +33,9 @@ struct PartitionInfo {
   [[nodiscard]] bool compatible() const { return protocol.major == kProtocolVersion.major; }
 };
 
-/// "was stopped" or "is lost", for a partition that is not reachable.
+/// "was stopped", "is lost" or "does not respond", for a partition that is not reachable.
 [[nodiscard]] inline const char* why_absent(const PartitionInfo& partition) {
+  if (partition.silent) return "does not respond";
   return partition.stopped ? "was stopped" : "is lost";
 }
 

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -343,4 +345,46 @@ TEST_CASE("robots: the parts of a URDF together are the whole robot") {
     }
     CHECK(count == whole.size());
   }
+}
+
+TEST_CASE("robots: what is left of a part beside what others own can be written as links") {
+  Random random(4701);
+  INFO("seed " << random.seed());
+  int rest_without_root = 0;
+  for (int n = 0; n < 300; ++n) {
+    const std::string name =
+        std::vector<std::string>{"ur5e", "mobile_arm", "two_arms"}[random.index(3)];
+    UrdfPart part{TFDUDE_EXAMPLES "/robots/" + name + ".urdf"};
+    part.prefix = random.index(2) == 0 ? "" : "r1_";
+    part.root = "world";
+    // The second time it has links already.
+    for (int round = 0; round < 2; ++round) {
+      const auto before = tfdude::load_urdf(part).value();
+      std::set<std::string> taken{"elsewhere"};
+      std::vector<std::string> wanted;
+      const std::size_t rate = 1 + random.index(6);
+      for (const FrameSpec& one : before) {
+        if (random.index(rate) == 0) {
+          taken.insert(one.id);
+        } else {
+          wanted.push_back(one.id);
+        }
+      }
+      const auto rest = tfdude::urdf_without(part, taken).value();
+      REQUIRE(rest.has_value() == !wanted.empty());
+      if (!rest) break;
+      std::string entries;
+      for (const std::string& entry : rest->links) entries += entry + " ";
+      INFO(name << ", " << taken.size() - 1 << " taken: " << entries);
+      std::vector<std::string> left;
+      const auto loaded = tfdude::load_urdf(*rest).value();
+      for (const FrameSpec& one : loaded) left.push_back(one.id);
+      std::sort(left.begin(), left.end());
+      std::sort(wanted.begin(), wanted.end());
+      CHECK(left == wanted);
+      rest_without_root += rest->root.empty() && !part.root.empty() ? 1 : 0;
+      part = *rest;
+    }
+  }
+  CHECK(rest_without_root > 20);
 }

@@ -252,6 +252,48 @@ TEST_CASE("a reported silence counts from the first report") {
   }
 }
 
+TEST_CASE("of a partition that others call silent nobody claims a loss before they do") {
+  Replica replica;
+  Presence base = presence_of("base", 1, 0);
+  Presence head = presence_of("head", 2, 0);
+  const auto told = [&](Presence& teller, Kind kind) {
+    teller.absent = {{"arm", 0, kind, 7}};
+    replica.directory.apply(teller, kNow);
+  };
+  const auto why = [&] {
+    const auto all = replica.directory.partitions();
+    const auto arm = std::find_if(all.begin(), all.end(),
+                                  [](const PartitionInfo& one) { return one.name == "arm"; });
+    return arm == all.end() ? std::string("none") : std::string(why_absent(*arm));
+  };
+  told(base, Kind::kSilent);
+  CHECK(why() == "does not respond");
+  SECTION("it was stopped") {
+    told(base, Kind::kStopped);
+    CHECK(why() == "was stopped");
+    told(head, Kind::kSilent);
+    CHECK(why() == "was stopped");
+  }
+  SECTION("it is lost") {
+    told(base, Kind::kLost);
+    CHECK(why() == "is lost");
+  }
+  SECTION("who said so was restarted, and cannot say any more what became of it") {
+    base = presence_of("base", 2, 0);
+    replica.directory.apply(base, kNow);
+    for (int quarter = 0; quarter <= 4; ++quarter) {
+      CHECK(why() == "does not respond");
+      (void)replica.directory.look_for_gone(kStart + quarter * Absences::kGrace / 4);
+    }
+    CHECK(why() == "is lost");
+  }
+  SECTION("it returns, and is lost here") {
+    replica.directory.apply(presence_of("arm", 7, 0), kNow);
+    CHECK(replica.directory.lost("arm", 7, kNow));
+    CHECK(why() == "is lost");
+  }
+}
+
 TEST_CASE("no frame is yielded to a silent partition") {
   Replica replica("left_arm");
   Partition partition("left_arm", 1, replica.forest, replica.directory);

@@ -150,8 +150,38 @@ TEST_CASE("recording: a file without transforms is rejected with a clear error")
   const auto recording = Recording::read(file);
   REQUIRE_FALSE(recording);
   CHECK_THAT(recording.error().message, testing::ContainsSubstring("no transforms"));
-  CHECK_FALSE(Recording::read("no MCAP file"));
-  CHECK_FALSE(Recording::read(""));
+  CHECK(recording.error().code == Errc::kConfig);
+}
+
+TEST_CASE("recording: the code of an error is that of files, not that of the state of partitions") {
+  const File file;
+  auto writer = RecordingWriter::create(file.path(), at(1)).value();
+  record(writer, 3);
+  REQUIRE(writer.finish(at(3)));
+  const std::string bytes = file.bytes();
+  const std::string ros = file_of_ros("tf2_msgs/msg/TFMessage", "", "/tf");
+  const auto code_of = [](const auto& result) {
+    return result ? std::string("ok") : std::string(to_string(result.error().code));
+  };
+  CHECK(code_of(Recording::read("no MCAP file")) == "config");
+  CHECK(code_of(Recording::read("")) == "config");
+  CHECK(code_of(Recording::open(file.path() + ".none")) == "config");
+  CHECK(code_of(Recording::open("/")) == "config");
+  // Wherever it is cut, and whatever byte is another one, nothing blames a state file.
+  for (const std::string& whole : {bytes, ros}) {
+    for (std::size_t size = 0; size < whole.size(); size += 1 + whole.size() / 200) {
+      const std::string code = code_of(Recording::read(whole.substr(0, size)));
+      INFO("cut after " << size << " of " << whole.size() << ": " << code);
+      CHECK((code == "ok" || code == "config"));
+      std::string damaged = whole;
+      damaged[size] = static_cast<char>(damaged[size] ^ 0x55);
+      const std::string other = code_of(Recording::read(damaged));
+      INFO("damaged at " << size << ": " << other);
+      CHECK(other != "state");
+    }
+  }
+  CHECK(code_of(RecordingWriter::create(file.path(), at(1))) == "already_exists");
+  CHECK(code_of(RecordingWriter::create("/none/robot.mcap", at(1))) == "invalid_input");
 }
 
 TEST_CASE("recording: a compression that cannot be read is named") {

@@ -337,6 +337,29 @@ TEST_CASE("a history reports rate and gaps and jitter") {
   CHECK(arm.forest.histories("nobody").empty());
 }
 
+TEST_CASE("settings for samples that may come make no edge a dynamic one") {
+  Arm arm;
+  EdgeTiming timing;
+  timing.count = 500;
+  REQUIRE(arm.forest.add("lamp", "world", {}));
+  REQUIRE(arm.forest.set_timing("lamp", timing));
+  CHECK(arm.forest.histories("lamp").empty());
+  CHECK(arm.forest.histories().size() == 2);
+  // What was rejected is told, but of no history.
+  CHECK(outcome(arm.forest.update("lamp", along_x(1), at(10'000'000))) == "invalid_input");
+  REQUIRE(arm.forest.histories("lamp").size() == 1);
+  CHECK(arm.forest.histories("lamp").at(0).refused_ahead == 1);
+  CHECK(arm.forest.histories("lamp").at(0).count_limit == 0);
+  timing.moving = true;
+  REQUIRE(arm.forest.add("door", "world", {}));
+  REQUIRE(arm.forest.set_timing("door", timing));
+  const HistoryInfo door = arm.forest.histories("door").at(0);
+  CHECK(door.count_limit == 500);
+  CHECK_FALSE(door.newest);
+  REQUIRE(arm.forest.update("lamp", along_x(1), at(1000)));
+  CHECK(arm.forest.histories("lamp").at(0).count_limit == 500);
+}
+
 TEST_CASE("each value is reported once and values of one stamp together") {
   Arm arm;
   std::vector<EdgeCursor> cursors;

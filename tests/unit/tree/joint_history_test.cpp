@@ -216,7 +216,7 @@ TEST_CASE("the history of a joint restarts and is dropped like any other") {
   robot.turn(11, 600);
   CHECK(robot.difference(query(550), 13, 0.01) == "");
   REQUIRE(robot.forest.move("arm", ""));
-  CHECK(robot.forest.histories("arm").at(0).samples == 0);
+  CHECK(robot.forest.histories("arm").empty());
 }
 
 TEST_CASE("a sample takes at most 120 bytes if its neighbour has the same covariance") {
