@@ -53,9 +53,9 @@ OneInstant one_instant(std::vector<SegmentValues> answers, std::optional<Time> h
   const Time newest = *last->stamp;
   std::chrono::nanoseconds longest{0};
   for (const SegmentValues& answer : answers) longest = std::max(longest, answer.period);
-  const auto oldest = std::min<std::chrono::nanoseconds>(longest, kOldestGuess / 2);
-  const bool near =
-      hint && *hint <= newest && *hint >= earlier_by(earlier_by(newest, oldest), oldest);
+  const bool near = hint && *hint <= newest &&
+                    *hint >= earlier_by(newest, 2 * std::min<std::chrono::nanoseconds>(
+                                                        longest, kOldestGuess / 2));
   if (near && take_hint(answers, *hint)) return {std::move(answers), std::nullopt};
   return {{}, newest};
 }
