@@ -140,7 +140,8 @@ std::string unspecified_edges(const Config& config) {
 
 std::vector<std::string> links_to_write(const Arguments& arguments, const Config& config) {
   if (config.urdfs.empty()) return {};
-  auto client = Client::open(arguments.options);
+  const Options& joining = arguments.options;
+  auto client = Client::open(joining);
   const auto frames = client ? client->frames() : Result<std::vector<Frame>>();
   if (!frames) return {};
   std::set<std::string> taken;
