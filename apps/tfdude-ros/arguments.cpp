@@ -80,7 +80,7 @@ class CommandLine {
       settings.options.clock = clock_kind_ == "system" ? ClockKind::kSystem : ClockKind::kExternal;
     }
     if (prefix_->count() > 0) set_prefix(text_, settings);
-    return {};
+    return check_partitions(settings);
   }
 
  private:

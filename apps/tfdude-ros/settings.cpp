@@ -22,6 +22,15 @@ ImportSettings import_of(const Settings& settings) {
   return import;
 }
 
+Result<void> check_partitions(const Settings& settings) {
+  const bool same =
+      settings.description_in && settings.description_in->partition == settings.partition;
+  if (!same) return {};
+  return fail(Errc::kInvalidInput, "partition " + quote(settings.partition) +
+                                       " is that of the frames of /tf: description_in needs "
+                                       "another one");
+}
+
 void set_prefix(const std::string& prefix, Settings& settings) {
   settings.prefix = prefix;
   if (settings.frames_in) settings.frames_in->prefix = prefix;

@@ -60,6 +60,10 @@ struct Settings {
 /// How the frames of ROS are taken: as for /tf, if that is taken.
 [[nodiscard]] ImportSettings import_of(const Settings& settings);
 
+/// @return kInvalidInput: the frames of /tf and a description would be one partition, which nobody
+///   can serve twice
+[[nodiscard]] Result<void> check_partitions(const Settings& settings);
+
 /// Prepends a prefix to all names of ROS.
 void set_prefix(const std::string& prefix, Settings& settings);
 

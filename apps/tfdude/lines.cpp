@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <poll.h>
+#include <string_view>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
@@ -67,7 +68,9 @@ std::optional<std::string> Lines::next() {
   if (at_ == buffer_.size() && end == buffer_.size()) return std::nullopt;
   std::string line = buffer_.substr(at_, end - at_);
   at_ = std::min(end + 1, buffer_.size());
-  ++number_;
+  // The byte order mark that some editors write.
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (++number_ == 1 && line.rfind(kMark, 0) == 0) line.erase(0, kMark.size());
   return line;
 }
 

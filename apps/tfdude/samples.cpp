@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -27,6 +28,9 @@ Result<Time> stamp_of(double seconds) {
 }
 
 Result<std::optional<Time>> stamp_of(const Json& object) {
+  if (object.contains("stamp") && object.contains("stamp_ns")) {
+    return wrong("stamp and stamp_ns are both given");
+  }
   if (const auto ns = object.find("stamp_ns"); ns != object.end()) {
     if (!ns->is_number_unsigned() || ns->get<std::uint64_t>() > INT64_MAX) {
       return wrong("stamp_ns is not a whole number of nanoseconds");
@@ -63,6 +67,25 @@ Result<void> check_keys(const Json& object, std::initializer_list<const char*> k
     }
   }
   return {};
+}
+
+// An object of JSON, each of whose keys is given once: of two, one would be lost.
+Result<Json> parse_object(const std::string& line) {
+  std::vector<std::set<std::string>> open;
+  std::optional<std::string> twice;
+  const auto note = [&](int /*depth*/, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) open.emplace_back();
+    if (event == Json::parse_event_t::object_end) open.pop_back();
+    if (event == Json::parse_event_t::key &&
+        !open.back().insert(parsed.get<std::string>()).second) {
+      twice = parsed.get<std::string>();
+    }
+    return true;
+  };
+  Json object = Json::parse(line, note, false);
+  if (!object.is_object()) return wrong("not an object of JSON");
+  if (twice) return wrong("key " + quote(*twice) + " is given twice");
+  return object;
 }
 
 Result<EdgeUpdate> read_edge(const Json& object, const AngleUnit& angles) {
@@ -133,6 +156,16 @@ bool add_number(Json& edge, const std::string& column, double number) {
   return false;
 }
 
+// Names of joints may be any ids, but not what only a line of JSON or of values has.
+Result<void> check_column(const std::string& column) {
+  if (column.find_first_of("[{\"") == 0 || to_number(column)) {
+    return wrong(quote(column) +
+                 " is no name of a column: the first line is neither an object of "
+                 "JSON nor the names of CSV");
+  }
+  return check_id(column, "the name of a column");
+}
+
 // All columns of a group are needed, since a value cannot be partial.
 Result<void> check_columns(const std::vector<std::string>& columns) {
   const auto has = [&](const std::string& name) {
@@ -140,10 +173,12 @@ Result<void> check_columns(const std::vector<std::string>& columns) {
   };
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty()) return wrong("column " + std::to_string(i + 1) + " has no name");
+    if (auto ok = check_column(columns[i]); !ok) return ok;
     if (std::count(columns.begin(), columns.end(), columns[i]) > 1) {
       return wrong("column " + quote(columns[i]) + " is given twice");
     }
   }
+  if (has("stamp") && has("stamp_ns")) return wrong("stamp and stamp_ns are both given");
   if (!has("edge")) return {};
   Json edge;
   for (const std::string& column : columns) {
@@ -174,7 +209,6 @@ Result<double> SampleReader::position(const std::string& joint, double typed) co
 }
 
 Result<Sample> SampleReader::read_object(const Json& object) const {
-  if (!object.is_object()) return wrong("not an object of JSON");
   Sample sample;
   const auto stamp = stamp_of(object);
   if (!stamp) return tl::unexpected(stamp.error());
@@ -188,9 +222,15 @@ Result<Sample> SampleReader::read_object(const Json& object) const {
   if (auto ok = check_keys(object, {"edges", "joints", "stddev", "stamp", "stamp_ns"}); !ok) {
     return tl::unexpected(ok.error());
   }
+  std::set<std::string> ids;
   for (const Json& one : object.value("edges", Json::array())) {
     auto edge = read_edge(one, angles_);
     if (!edge) return tl::unexpected(edge.error());
+    if (one.contains("stamp") || one.contains("stamp_ns")) {
+      return wrong("edge " + quote(edge->id) +
+                   ": the stamp stands beside \"edges\", for all of them");
+    }
+    if (!ids.insert(edge->id).second) return wrong("edge " + quote(edge->id) + " is given twice");
     sample.edges.push_back(*std::move(edge));
   }
   const Json joints = object.value("joints", Json::object());
@@ -213,7 +253,15 @@ Result<Sample> SampleReader::read_object(const Json& object) const {
   return sample;
 }
 
-Result<void> SampleReader::read_row(const std::string& line, Json& object) const {
+Result<void> SampleReader::finish() const {
+  if (!lacks_rows_) return {};
+  return wrong(
+      "no row follows the names of the columns; if this is none of CSV, a line is an object "
+      "of JSON");
+}
+
+Result<Json> SampleReader::read_row(const std::string& line) const {
+  Json object = Json::object();
   const std::vector<std::string> cells = split(line);
   if (cells.size() != columns_.size()) {
     return wrong(std::to_string(cells.size()) + " values for " + std::to_string(columns_.size()) +
@@ -240,28 +288,31 @@ Result<void> SampleReader::read_row(const std::string& line, Json& object) const
       (void)add_number(object, column, number);
     }
   }
-  return {};
+  return object;
 }
 
 Result<std::optional<Sample>> SampleReader::read(const std::string& line) {
   const std::size_t first = line.find_first_not_of(" \t\r");
   if (first == std::string::npos) return std::nullopt;
-  if (form_ == Form::kUndecided && line[first] != '{') {
+  const bool is_json = line[first] == '{';
+  if (form_ == Form::kNoNames && !is_json) return wrong("the names of the columns were wrong");
+  if (form_ == Form::kUndecided && !is_json) {
     const auto columns = split(line);
-    if (auto ok = check_columns(columns); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_columns(columns); !ok) {
+      form_ = Form::kNoNames;
+      return tl::unexpected(ok.error());
+    }
     form_ = Form::kCsv;
     columns_ = columns;
     edges_ = std::find(columns.begin(), columns.end(), "edge") != columns.end();
+    lacks_rows_ = true;
     return std::nullopt;
   }
-  if (form_ == Form::kUndecided) form_ = Form::kJson;
-  Json object = Json::object();
-  if (form_ == Form::kJson) {
-    object = Json::parse(line, nullptr, false);
-  } else if (auto ok = read_row(line, object); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  const auto sample = read_object(object);
+  lacks_rows_ = false;
+  if (form_ != Form::kCsv) form_ = Form::kJson;
+  auto object = form_ == Form::kJson ? parse_object(line) : read_row(line);
+  if (!object) return tl::unexpected(std::move(object.error()));
+  const auto sample = read_object(*object);
   if (!sample) return tl::unexpected(sample.error());
   return *sample;
 }

@@ -36,22 +36,25 @@ class SampleReader {
   /// @return the line's values; none for an empty line or the names of CSV; kInvalidInput naming
   ///   what is wrong.
   [[nodiscard]] Result<std::optional<Sample>> read(const std::string& line);
+  /// Call after the last line. @return kInvalidInput: it was the names of CSV, without values
+  [[nodiscard]] Result<void> finish() const;
 
   /// A position or standard deviation of a joint [rad or m].
   [[nodiscard]] Result<double> position(const std::string& joint, double typed) const;
 
  private:
-  enum class Form { kUndecided, kJson, kCsv };
+  enum class Form { kUndecided, kNoNames, kJson, kCsv };  // kNoNames: the first line was wrong
 
   [[nodiscard]] Result<Sample> read_object(const nlohmann::json& object) const;
-  /// Adds what a line of CSV says, as an object of JSON says it.
-  [[nodiscard]] Result<void> read_row(const std::string& line, nlohmann::json& object) const;
+  /// What a line of CSV says, as an object of JSON.
+  [[nodiscard]] Result<nlohmann::json> read_row(const std::string& line) const;
 
   AngleUnit angles_;
   std::map<std::string, JointInfo> joints_;
   Form form_ = Form::kUndecided;
   std::vector<std::string> columns_;
   bool edges_ = false;  // a row is an edge; otherwise its columns are joints
+  bool lacks_rows_ = false;
 };
 
 }  // namespace tfdude::cli

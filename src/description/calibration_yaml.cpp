@@ -1,7 +1,10 @@
 // Calibrations in YAML: Kalibr, easy_handeye, OpenCV.
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -17,14 +20,15 @@ class CalibrationReader : public YamlFields {
   using YamlFields::YamlFields;
 
   [[nodiscard]] FileEdges kalibr(const YAML::Node& root) const;
-  [[nodiscard]] FileEdges hand_eye(const YAML::Node& root) const;
+  [[nodiscard]] FileEdges hand_eye(const YAML::Node& root, std::optional<bool> said) const;
   [[nodiscard]] FileEdges opencv(const YAML::Node& root) const;
 
  private:
   [[nodiscard]] Result<Pose> matrix(const Field& field, const std::string& what) const;
   [[nodiscard]] Result<Eigen::MatrixXd> opencv_matrix(const Fields& entries, const char* key) const;
   [[nodiscard]] Result<std::string> frame(const Fields& entries, const char* key) const;
-  [[nodiscard]] Result<bool> on_hand(const Fields& entries, const YAML::Node& node) const;
+  [[nodiscard]] Result<bool> on_hand(const Fields& entries, const YAML::Node& node,
+                                     std::optional<bool> expected) const;
   template <std::size_t N>
   [[nodiscard]] Result<std::array<double, N>> parts(const Fields& entries, const YAML::Node& node,
                                                     const std::array<const char*, N>& keys,
@@ -114,7 +118,7 @@ class KalibrChain {
  private:
   static bool is_near(const Pose& X) {
     constexpr double kSame = 1e-3;  // [m] and [rad]: more than the digits that files are given
-    return log(X).cwiseAbs().maxCoeff() <= kSame;
+    return X.translation().norm() <= kSame && log(X).tail<3>().norm() <= kSame;
   }
 
   void begin(const Camera& camera) {
@@ -179,7 +183,8 @@ Result<std::string> CalibrationReader::frame(const Fields& entries, const char* 
   return text(found->second, key);
 }
 
-Result<bool> CalibrationReader::on_hand(const Fields& entries, const YAML::Node& node) const {
+Result<bool> CalibrationReader::on_hand(const Fields& entries, const YAML::Node& node,
+                                        std::optional<bool> expected) const {
   const auto type = entries.find("calibration_type");
   const auto flag = entries.find("eye_on_hand");
   if (type == entries.end() && flag == entries.end()) {
@@ -188,11 +193,15 @@ Result<bool> CalibrationReader::on_hand(const Fields& entries, const YAML::Node&
   const bool typed = type != entries.end();
   const Field& field = typed ? type->second : flag->second;
   const std::string said = field.value.IsScalar() ? field.value.Scalar() : "";
-  for (const char* yes : {"eye_in_hand", "true", "True"}) {
-    if (said == yes) return true;
-  }
-  for (const char* no : {"eye_on_base", "false", "False"}) {
-    if (said == no) return false;
+  for (const auto& [word, is_on_hand] :
+       {std::pair("eye_in_hand", true), std::pair("true", true), std::pair("True", true),
+        std::pair("eye_on_base", false), std::pair("false", false), std::pair("False", false)}) {
+    if (said != word) continue;
+    if (is_on_hand == expected.value_or(is_on_hand)) return is_on_hand;
+    return error(Errc::kInvalidInput, field.mark,
+                 std::string("the format is ") + (is_on_hand ? "eye-on-base" : "eye-on-hand") +
+                     ", but the file says that the camera is on the " +
+                     (is_on_hand ? "hand" : "base"));
   }
   return error(Errc::kInvalidInput, field.mark,
                typed ? "calibration_type is neither eye_in_hand nor eye_on_base"
@@ -217,7 +226,7 @@ Result<std::array<double, N>> CalibrationReader::parts(const Fields& entries,
 }
 
 // The transform is the pose of the tracking system's frame in the robot's hand or base.
-FileEdges CalibrationReader::hand_eye(const YAML::Node& root) const {
+FileEdges CalibrationReader::hand_eye(const YAML::Node& root, std::optional<bool> expected) const {
   const auto top = fields(root, "the file");
   if (!top) return tl::unexpected(top.error());
   auto said = *top;  // early versions have the parameters beside the transformation
@@ -226,7 +235,7 @@ FileEdges CalibrationReader::hand_eye(const YAML::Node& root) const {
     if (!below) return tl::unexpected(std::move(below.error()));
     said = *std::move(below);
   }
-  const auto hand = on_hand(said, root);
+  const auto hand = on_hand(said, root, expected);
   if (!hand) return tl::unexpected(hand.error());
   auto parent = frame(said, *hand ? "robot_effector_frame" : "robot_base_frame");
   if (!parent) return tl::unexpected(std::move(parent.error()));
@@ -276,17 +285,18 @@ Result<Eigen::MatrixXd> CalibrationReader::opencv_matrix(const Fields& entries,
   constexpr std::array<const char*, 2> kSizes = {"rows", "cols"};
   const auto sizes = parts(*keys, node, kSizes, what);
   if (!sizes) return tl::unexpected(sizes.error());
-  const auto data = keys->find("data");
-  constexpr double kMost = 9;
-  const double count = (*sizes)[0] * (*sizes)[1];
-  if (data == keys->end() || !data->second.value.IsSequence() || !(count > 0 && count <= kMost) ||
-      static_cast<double>(data->second.value.size()) != count) {
-    return error(Errc::kConfig, found->second.mark, what + ": data are not rows x cols numbers");
+  for (const double size : *sizes) {
+    constexpr double kMost = 9;
+    if (size >= 1 && size <= kMost && size == std::floor(size)) continue;
+    return error(Errc::kConfig, found->second.mark,
+                 what + ": rows and cols are not whole numbers from 1 to 9");
   }
   Eigen::MatrixXd matrix(static_cast<Eigen::Index>((*sizes)[0]),
                          static_cast<Eigen::Index>((*sizes)[1]));
-  if (static_cast<double>(matrix.size()) != count) {
-    return error(Errc::kConfig, found->second.mark, what + ": rows and cols are no whole numbers");
+  const auto data = keys->find("data");
+  if (data == keys->end() || !data->second.value.IsSequence() ||
+      static_cast<Eigen::Index>(data->second.value.size()) != matrix.size()) {
+    return error(Errc::kConfig, found->second.mark, what + ": data are not rows x cols numbers");
   }
   for (Eigen::Index i = 0; i < matrix.size(); ++i) {
     const auto value = number(data->second.value[static_cast<std::size_t>(i)], what + ": data");
@@ -314,12 +324,21 @@ FileEdges CalibrationReader::opencv(const YAML::Node& root) const {
   return std::vector<FileEdge>{edge("right", "left", X_21->inverse(), mark("R").line + 1)};
 }
 
-FileEdges read(const std::string& text, const std::string& name,
-               FileEdges (CalibrationReader::*member)(const YAML::Node&) const) {
+FileEdges read(
+    const std::string& text, const std::string& name,
+    const std::function<FileEdges(const CalibrationReader&, const YAML::Node&)>& edges_of) {
+  if (const auto first = text.find_first_not_of(" \t\r\n");
+      first < text.size() && text[first] == '<') {
+    return fail(Errc::kConfig, name + ": is XML, which is not read: save it as YAML or JSON");
+  }
+  // OpenCV writes "%YAML:1.0", which is no directive of YAML; as a comment it keeps the numbers of
+  // lines.
+  std::string yaml = text;
+  if (!yaml.empty() && yaml.front() == '%') yaml.front() = '#';
   const CalibrationReader reader(name);
   FileEdges edges;
-  auto ok = reader.read_document(text, [&](const YAML::Node& root) -> Result<void> {
-    edges = (reader.*member)(root);
+  auto ok = reader.read_document(yaml, [&](const YAML::Node& root) -> Result<void> {
+    edges = edges_of(reader, root);
     return {};
   });
   if (!ok) return tl::unexpected(std::move(ok.error()));
@@ -332,15 +351,15 @@ FileEdges read_kalibr(const std::string& text, const std::string& name) {
   return read(text, name, &CalibrationReader::kalibr);
 }
 
-FileEdges read_hand_eye(const std::string& text, const std::string& name) {
-  return read(text, name, &CalibrationReader::hand_eye);
+FileEdges read_hand_eye(const std::string& text, const std::string& name,
+                        std::optional<bool> on_hand) {
+  return read(text, name, [&](const CalibrationReader& reader, const YAML::Node& root) {
+    return reader.hand_eye(root, on_hand);
+  });
 }
 
 FileEdges read_opencv(const std::string& text, const std::string& name) {
-  // "%YAML:1.0" is no directive of YAML; as a comment it keeps the numbers of lines.
-  std::string yaml = text;
-  if (!yaml.empty() && yaml.front() == '%') yaml.front() = '#';
-  return read(yaml, name, &CalibrationReader::opencv);
+  return read(text, name, &CalibrationReader::opencv);
 }
 
 }  // namespace tfdude

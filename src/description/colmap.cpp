@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <map>
 
+#include "tfdude/base/id.hpp"
+
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
 
@@ -54,6 +56,35 @@ Result<GivenCovariances> covariances_of(const std::string& text, const std::stri
   return given;
 }
 
+// Which other file of a model a line is from, as far as its words tell; null: none.
+const char* other_file(const std::vector<std::string_view>& words) {
+  // FRAME_ID RIG_ID QW QX QY QZ TX TY TZ NUM_DATA_IDS, then SENSOR_TYPE SENSOR_ID DATA_ID each
+  const bool has_sensor =
+      words.size() >= 13 && (words[10] == "CAMERA" || words[10] == "IMU") && count_of(words[1]);
+  if (has_sensor) return "frames.txt";
+  // POINT3D_ID X Y Z R G B ERROR, then IMAGE_ID POINT2D_IDX each
+  constexpr std::size_t kBrightest = 255;
+  for (const std::size_t i : {4U, 5U, 6U}) {
+    const auto colour = count_of(words[i]);
+    if (!colour || *colour > kBrightest) return nullptr;
+  }
+  const bool has_track =
+      words.size() % 2 == 0 && std::all_of(words.begin() + 8, words.end(), count_of);
+  return has_track ? "points3D.txt" : nullptr;
+}
+
+// The pose of an image. @param words  of its line, at least ten
+Result<Pose> camera_pose(const std::vector<std::string_view>& words,
+                         const std::array<double, 7>& numbers) {
+  const auto& [qw, qx, qy, qz, tx, ty, tz] = numbers;
+  const auto X_CW = Pose::create({qw, qx, qy, qz}, {tx, ty, tz});
+  const char* other = other_file(words);
+  const bool is_other = other != nullptr && (!X_CW || std::string_view(other) == "frames.txt");
+  if (!is_other) return X_CW;
+  return fail(Errc::kInvalidInput,
+              std::string("is a line of ") + other + ": only images.txt is read");
+}
+
 }  // namespace
 
 // For each image two lines: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, the pose of the world in
@@ -64,6 +95,7 @@ FileEdges read_colmap(const std::string& text, const std::string& covariances,
   auto given = covariances_of(covariances, covariances_name);
   if (!given) return tl::unexpected(std::move(given.error()));
   std::vector<FileEdge> edges;
+  std::map<std::size_t, int> images;  // the line of each
   TextLines lines(text);
   while (lines.next()) {
     const auto words = words_of(lines.line());
@@ -75,9 +107,17 @@ FileEdges read_colmap(const std::string& text, const std::string& covariances,
       return file_error(Errc::kConfig, name, line,
                         "is not IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
     }
-    const auto& [qw, qx, qy, qz, tx, ty, tz] = *numbers;
-    const auto X_CW = Pose::create({qw, qx, qy, qz}, {tx, ty, tz});
+    const auto X_CW = camera_pose(words, *numbers);
     if (!X_CW) return file_error(Errc::kInvalidInput, name, line, X_CW.error().message);
+    if (!count_of(words[8])) {
+      return file_error(Errc::kConfig, name, line,
+                        "CAMERA_ID is " + quote(words[8]) + ", which is not a whole number");
+    }
+    if (const auto [other, fresh] = images.emplace(*image, line); !fresh) {
+      return file_error(Errc::kInvalidInput, name, line,
+                        "image " + std::to_string(*image) + " is given twice, before in line " +
+                            std::to_string(other->second));
+    }
     FileEdge edge;
     edge.line = line;
     // A name may have spaces.

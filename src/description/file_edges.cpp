@@ -11,13 +11,11 @@ namespace tfdude {
 
 Result<Pose> rounded_pose(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
   constexpr double kTolerance = 1e-3;
-  const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
-  // Also rejects NaN.
-  if (!(off <= kTolerance && rotation.determinant() > 0)) {
-    return fail(Errc::kInvalidInput, "the upper left 3x3 is no rotation");
-  }
+  const auto wrong = fail(Errc::kInvalidInput, "the upper left 3x3 is no rotation");
+  if (!rotation.allFinite() || !(rotation.determinant() > 0)) return wrong;
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
+  if ((rotation - nearest).cwiseAbs().maxCoeff() > kTolerance) return wrong;
   return Pose::create(Eigen::Quaterniond(nearest), translation);
 }
 

@@ -22,7 +22,9 @@ using FileEdges = Result<std::vector<FileEdge>>;
 
 // The readers. `name` stands for the file in messages.
 [[nodiscard]] FileEdges read_kalibr(const std::string& text, const std::string& name);
-[[nodiscard]] FileEdges read_hand_eye(const std::string& text, const std::string& name);
+/// @param on_hand  what the caller says of it; kInvalidInput: the file says the contrary
+[[nodiscard]] FileEdges read_hand_eye(const std::string& text, const std::string& name,
+                                      std::optional<bool> on_hand);
 [[nodiscard]] FileEdges read_opencv(const std::string& text, const std::string& name);
 [[nodiscard]] FileEdges read_launch(const std::string& text, const std::string& name);
 /// @param covariances  as of FrameFile, its text
@@ -30,8 +32,8 @@ using FileEdges = Result<std::vector<FileEdge>>;
                                     const std::string& name);
 [[nodiscard]] FileEdges read_g2o(const std::string& text, const std::string& name);
 
-/// The pose that a rotation matrix of few digits stands for: the nearest rotation, if that is
-/// within 1e-3.
+/// The pose that a rotation matrix of few digits stands for: the nearest rotation, if no entry
+/// differs from that by more than 1e-3, as after rounding to three decimals.
 /// @return kInvalidInput: no rotation; as Pose::create()
 [[nodiscard]] Result<Pose> rounded_pose(const Eigen::Matrix3d& rotation,
                                         const Eigen::Vector3d& translation);

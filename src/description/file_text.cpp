@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <string_view>
 #include <system_error>
 
 #include "tfdude/base/id.hpp"
@@ -29,6 +30,9 @@ Result<std::string> read_text(const std::string& path) {
     if (text.size() > kMaxBytes) return fail(Errc::kConfig, name + ": is longer than 64 MiB");
   }
   if (file.bad()) return fail(Errc::kConfig, name + ": cannot be read: " + reason());
+  // The byte order mark that some editors write.
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.rfind(kMark, 0) == 0) text.erase(0, kMark.size());
   return text;
 }
 

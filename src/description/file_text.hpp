@@ -7,7 +7,7 @@
 namespace tfdude {
 
 /// Reads a whole file of at most 64 MiB. That is room for half a million frames, and also stops
-/// reading /dev/zero.
+/// reading /dev/zero. A byte order mark of UTF-8 at its begin is left out.
 /// @return kConfig naming the file: missing, a directory, not readable, too long.
 [[nodiscard]] Result<std::string> read_text(const std::string& path);
 

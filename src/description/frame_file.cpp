@@ -39,16 +39,35 @@ bool begins_with_image(const std::string& text) {
   return false;
 }
 
+// Whether a file is YAML in flow style, as JSON is.
+bool is_flow(const std::string& text) {
+  TextLines lines(text);
+  while (lines.next()) {
+    const auto words = words_of(lines.line());
+    const bool begins = !words.empty() && words[0][0] != '#' && words[0][0] != '%';
+    if (begins && words[0] != "---") return words[0][0] == '{';
+  }
+  return false;
+}
+
+// Whether YAML has a key: at the begin of a line, or anywhere in flow style.
+bool has_key(const std::string& text, const std::string& key, bool flow) {
+  const std::string quoted = '"' + key + "\":";
+  if (flow) {
+    return text.find(quoted) != std::string::npos || text.find(key + ":") != std::string::npos;
+  }
+  return has_line(text, key + ":") || has_line(text, quoted);
+}
+
 Result<FrameFormat> format_of(const std::string& text, const std::string& name) {
   if (text.find("static_transform_publisher") != std::string::npos) return FrameFormat::kRos2;
   if (has_line(text, "VERTEX_SE3:QUAT") || has_line(text, "EDGE_SE3:QUAT")) {
     return FrameFormat::kG2o;
   }
-  if (text.rfind("%YAML", 0) == 0 || text.find("!!opencv-matrix") != std::string::npos) {
-    return FrameFormat::kOpenCv;
-  }
-  if (has_line(text, "tracking_base_frame:")) return FrameFormat::kEyeOnHand;
-  if (has_line(text, "cam0:")) return FrameFormat::kKalibr;
+  if (text.find("opencv-matrix") != std::string::npos) return FrameFormat::kOpenCv;
+  const bool flow = is_flow(text);
+  if (has_key(text, "tracking_base_frame", flow)) return FrameFormat::kEyeOnHand;
+  if (has_key(text, "cam0", flow)) return FrameFormat::kKalibr;
   if (begins_with_image(text)) return FrameFormat::kColmap;
   return fail(Errc::kConfig, name + ": cannot tell its format: say which it is");
 }
@@ -64,7 +83,10 @@ FileEdges read_edges(const std::string& text, const FrameFile& file, const std::
       return read_kalibr(text, name);
     case FrameFormat::kEyeOnHand:
     case FrameFormat::kEyeOnBase:
-      return read_hand_eye(text, name);
+      return read_hand_eye(text, name,
+                           file.format.has_value()
+                               ? std::optional(*format == FrameFormat::kEyeOnHand)
+                               : std::nullopt);
     case FrameFormat::kRos1:
     case FrameFormat::kRos2:
       return read_launch(text, name);

@@ -1,10 +1,8 @@
-// Lines that start static_transform_publisher: launch files of ROS 1 and ROS 2, in XML, Python and
-// YAML, and shell scripts.
+// Starts of static_transform_publisher: in launch files of ROS 1 and ROS 2 (XML, Python, YAML), and
+// in shell scripts.
 
 #include <algorithm>
-#include <initializer_list>
 #include <map>
-#include <regex>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -25,21 +23,30 @@ using Words = std::vector<std::string>;
 constexpr const char* kProgram = kStaticPublisher;
 using Start = LaunchStart;
 
+// Those of ROS 2 itself end at "--", or at the end.
+void drop_ros_arguments(Words& words) {
+  for (auto at = words.begin();;) {
+    at = std::find(at, words.end(), "--ros-args");
+    if (at == words.end()) return;
+    const auto end = std::find(at, words.end(), "--");
+    at = words.erase(at, end == words.end() ? end : end + 1);
+  }
+}
+
 class Arguments {
  public:
   Arguments(Start start, const std::string& name) : start_(std::move(start)), name_(name) {}
 
   [[nodiscard]] Result<FileEdge> edge() {
     Words& words = start_.words;
-    words.erase(std::find(words.begin(), words.end(), "--ros-args"), words.end());
+    drop_ros_arguments(words);
     // Names and remappings of ROS 1.
     const auto is_mapping = [](const std::string& word) {
       return word.find(":=") != std::string::npos;
     };
     words.erase(std::remove_if(words.begin(), words.end(), is_mapping), words.end());
     for (const std::string& word : words) {
-      if (word.find("$(") == std::string::npos) continue;
-      return error(quote(word) + " is a substitution: put its value there");
+      if (word.find("$(") != std::string::npos) return error(launch_substitution(word));
     }
     const bool flags = std::any_of(words.begin(), words.end(), [](const std::string& word) {
       return word.rfind("--", 0) == 0;
@@ -187,82 +194,6 @@ Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::str
   return starts;
 }
 
-// The simple commands of a line of a shell script, up to a comment: what ; & and | divide outside
-// of quotes. The ampersands of redirections do not.
-std::vector<std::string> shell_commands(const std::string& line) {
-  std::vector<std::string> commands(1);
-  char quote = 0;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    const char before = i > 0 ? line[i - 1] : ' ';
-    const bool redirects = c == '&' && (before == '>' || line.compare(i + 1, 1, ">") == 0);
-    if (quote == 0 && c == '#' && (before == ' ' || before == '\t')) break;
-    if (c == quote) {
-      quote = 0;
-    } else if (quote == 0 && (c == '"' || c == '\'')) {
-      quote = c;
-    }
-    if (quote == 0 && (c == ';' || c == '&' || c == '|') && !redirects) {
-      commands.emplace_back();
-    } else {
-      commands.back() += c;
-    }
-  }
-  return commands;
-}
-
-std::string without_redirections(const std::string& command) {
-  static const std::regex kRedirection("([0-9]*|&)>+(&[0-9]|[ \t]*[^ \t]+)|<[ \t]*[^ \t]+");
-  return std::regex_replace(command, kRedirection, " ");
-}
-
-// How many more blocks a command begins than it ends: conditions and loops.
-int opened_by(const Words& command) {
-  const auto is_one_of = [&](std::initializer_list<const char*> words) {
-    return !command.empty() &&
-           std::find(words.begin(), words.end(), command.front()) != words.end();
-  };
-  if (is_one_of({"if", "for", "while", "until", "case"})) return 1;
-  return is_one_of({"fi", "done", "esac"}) ? -1 : 0;
-}
-
-// The commands of a shell script that start the program.
-Result<std::vector<Start>> starts_in_shell(const std::string& text, const std::string& name) {
-  std::vector<Start> starts;
-  TextLines lines(text);
-  int blocks = 0;
-  while (lines.next()) {
-    const int number = lines.number();
-    std::string line(lines.line());
-    const auto continues = [&] { return !line.empty() && line.back() == '\\'; };
-    while (continues()) {
-      line.back() = ' ';
-      if (!lines.next()) break;
-      line += lines.line();
-    }
-    for (const std::string& command : shell_commands(" " + line)) {
-      Words words = launch_words(without_redirections(command));
-      blocks += opened_by(words);
-      const auto program = std::find(words.begin(), words.end(), kProgram);
-      if (program == words.end()) continue;
-      if (blocks > 0) {
-        return file_error(Errc::kInvalidInput, name, number,
-                          std::string(kProgram) +
-                              " is started under a condition, or in a loop: write what happens");
-      }
-      Start start{{}, program != words.begin() && *(program - 1) == "tf", number};
-      for (auto word = program + 1; word != words.end(); ++word) {
-        word->erase(std::remove_if(word->begin(), word->end(),
-                                   [](char c) { return c == '"' || c == '\''; }),
-                    word->end());
-        start.words.push_back(std::move(*word));
-      }
-      starts.push_back(std::move(start));
-    }
-  }
-  return starts;
-}
-
 Result<std::vector<Start>> starts_in_python(const std::string& text, const std::string& name) {
   auto calls = python_arguments(text, kProgram, name);
   if (!calls) return tl::unexpected(std::move(calls.error()));
@@ -296,6 +227,10 @@ std::vector<std::string> launch_words(std::string_view text) {
   std::replace(line.begin(), line.end(), '\n', ' ');
   for (const std::string_view word : words_of(line)) words.emplace_back(word);
   return words;
+}
+
+std::string launch_substitution(const std::string& word) {
+  return quote(word) + " is a substitution: put its value there";
 }
 
 Result<bool> launch_condition(std::string_view said, const std::string& what,

@@ -21,6 +21,9 @@ struct LaunchStart {
 /// The words of arguments that may have several lines.
 [[nodiscard]] std::vector<std::string> launch_words(std::string_view text);
 
+/// What is said of an argument that only the launch system, or the shell, could tell.
+[[nodiscard]] std::string launch_substitution(const std::string& word);
+
 /// Whether a condition holds. @param what  that depends on it, for the message
 /// @return kInvalidInput naming file and line: only the launch system could tell
 [[nodiscard]] Result<bool> launch_condition(std::string_view said, const std::string& what,
@@ -30,5 +33,12 @@ struct LaunchStart {
 /// @return kConfig naming file and line: not YAML, no launch file; as launch_condition()
 [[nodiscard]] Result<std::vector<LaunchStart>> starts_in_yaml(const std::string& text,
                                                               const std::string& name);
+
+/// The starts that are commands of a shell script, in its order. Linear in its length.
+/// @return kConfig naming file and line: a quote has no end; kInvalidInput: a start that a
+///   condition or a loop decides about, with a substitution, or in a text that another program may
+///   run
+[[nodiscard]] Result<std::vector<LaunchStart>> starts_in_shell(const std::string& text,
+                                                               const std::string& name);
 
 }  // namespace tfdude

@@ -12,6 +12,7 @@
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
 #include "description/python_conditions.hpp"
+#include "description/python_escapes.hpp"
 
 namespace tfdude {
 namespace {
@@ -63,16 +64,20 @@ class Tokens {
     Token token{Token::Kind::kString, {}, line_, 0};
     at_ += quote.size();
     while (text_.substr(at_, quote.size()) != quote) {
-      if (at_ < text_.size() && text_[at_] == '\\') {
-        token.text += text_[at_++];
-      }
-      if (at_ >= text_.size() || (text_[at_] == '\n' && !is_long)) {
+      const bool is_escaped = at_ < text_.size() && text_[at_] == '\\';
+      if (is_escaped) token.text += text_[at_++];
+      if (at_ >= text_.size() || (text_[at_] == '\n' && !is_long && !is_escaped)) {
         return file_error(Errc::kConfig, file_, token.line, "a string has no end");
       }
       if (text_[at_] == '\n') ++line_;
       token.text += text_[at_++];
     }
     at_ += quote.size();
+    if (auto plain = python_unescaped(token.text)) {
+      token.text = *std::move(plain);
+    } else {
+      token.kind = Token::Kind::kWord;  // only Python knows what it stands for
+    }
     add(std::move(token));
     return {};
   }

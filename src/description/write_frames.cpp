@@ -4,6 +4,9 @@
 #include <cctype>
 #include <map>
 #include <set>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -46,10 +49,13 @@ std::string yaml_text(const std::string& name) {
   return text + "'";
 }
 
+bool has_blank(const std::string& name) {
+  return std::any_of(name.begin(), name.end(),
+                     [](unsigned char c) { return std::isspace(c) != 0; });
+}
+
 bool is_plain(const std::string& name) {
-  return std::none_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isspace(c) != 0 || c == '"' || c == '<' || c == '&' || c == '$' || c == '\'';
-  });
+  return !has_blank(name) && name.find_first_of("\"<&$'") == std::string::npos;
 }
 
 Result<const FrameSpec*> only(const Frames& frames, FrameFormat format) {
@@ -153,7 +159,7 @@ Result<std::string> colmap(const Frames& frames) {
       "#   POINTS2D[] as (X, Y, POINT3D_ID)\n";
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const FrameSpec& frame = frames[i];
-    if (!is_plain(frame.id)) return refused(frame, "images.txt cannot have a name with a space");
+    if (has_blank(frame.id)) return refused(frame, "images.txt cannot have a name with a space");
     if (frame.parent != frames.front().parent) {
       return refused(frame, "images.txt needs all frames in " + quote(frames.front().parent));
     }
@@ -246,13 +252,30 @@ Result<std::string> g2o(const Frames& frames) {
   return text;
 }
 
+// So that what is written can be read again.
+Result<void> check_tree(const Frames& frames) {
+  std::unordered_map<std::string_view, const FrameSpec*> known;
+  for (const FrameSpec& frame : frames) {
+    if (frame.parent.empty()) return refused(frame, "is a root, and has no edge");
+    if (!known.emplace(frame.id, &frame).second) return refused(frame, "is given twice");
+  }
+  std::unordered_set<std::string_view> placed;
+  for (const FrameSpec& frame : frames) {
+    std::unordered_set<std::string_view> chain;
+    for (auto at = known.find(frame.id); at != known.end(); at = known.find(at->second->parent)) {
+      if (placed.count(at->first) > 0) break;
+      if (!chain.insert(at->first).second) return refused(*at->second, "is below itself");
+    }
+    placed.merge(chain);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::string> write_frames(const std::vector<FrameSpec>& frames, FrameFormat format) {
   if (frames.empty()) return fail(Errc::kInvalidInput, "there are no edges to write");
-  for (const FrameSpec& frame : frames) {
-    if (frame.parent.empty()) return refused(frame, "is a root, and has no edge");
-  }
+  if (auto ok = check_tree(frames); !ok) return tl::unexpected(std::move(ok.error()));
   switch (format) {
     case FrameFormat::kKalibr:
       return kalibr(frames);

@@ -55,6 +55,18 @@ int line_of_too_many_attributes(std::string_view text) {
   return 0;
 }
 
+// The line of a document type that declares entities, whose names TinyXML would leave as they are;
+// 0: there is none.
+int line_of_entities(const tinyxml2::XMLDocument& document) {
+  for (const auto* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    const bool declares =
+        node->ToUnknown() != nullptr &&
+        std::string_view(node->Value()).find("<!ENTITY") != std::string_view::npos;
+    if (declares) return node->GetLineNum();
+  }
+  return 0;
+}
+
 }  // namespace
 
 Result<const tinyxml2::XMLElement*> parse_xml(tinyxml2::XMLDocument& document,
@@ -71,6 +83,10 @@ Result<const tinyxml2::XMLElement*> parse_xml(tinyxml2::XMLDocument& document,
   }
   if (document.Error()) {
     return file_error(Errc::kConfig, file, document.ErrorLineNum(), "not XML: " + reason(document));
+  }
+  if (const int line = line_of_entities(document); line > 0) {
+    return file_error(Errc::kConfig, file, line,
+                      "entities are not read: write what they stand for instead of their names");
   }
   const tinyxml2::XMLElement* root = document.RootElement();
   const auto* second = root == nullptr ? nullptr : root->NextSiblingElement();

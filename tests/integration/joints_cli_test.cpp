@@ -90,6 +90,22 @@ TEST_CASE("joints: two daemons serve one robot from one URDF") {
   CHECK(robot.turn("arm_mount", "shoulder_link") == Approx(-0.25));
 }
 
+TEST_CASE("joints: it is told which joints follow others") {
+  const TestDomain domain;
+  Process daemon = domain.start_daemon(
+      {"--no-state", "--partition", "hands", "--urdf", TFDUDE_EXAMPLES "/robots/two_arms.urdf"});
+  (void)await_ready(daemon);
+  const Arguments both = {"joint", "left_finger_1_joint=0.01", "left_finger_2_joint=0.02"};
+  const json moved = testing::answered(domain, both, 0);
+  REQUIRE(moved.at("joints").size() == 1);
+  CHECK(moved.at("joints").at(0).at("name") == "left_finger_1_joint");
+  CHECK(moved.at("ignored") == json({"left_finger_2_joint"}));
+  CHECK(testing::joint_of(domain, "left_finger_2_joint").at("position") == -0.01);
+  CHECK_THAT(domain.cli(both).out,
+             ContainsSubstring("ignored left_finger_2_joint: it follows left_finger_1_joint\n"));
+  CHECK(domain.cli({"joint", "left_finger_2_joint=0.02"}).status == 1);
+}
+
 TEST_CASE("joints: wrong input is rejected by name and changes nothing") {
   const Robot robot;
   CHECK_THAT(robot.refused({"joint", "knee", "1"}), ContainsSubstring("no joint 'knee'"));

@@ -153,6 +153,20 @@ TEST_CASE("values: samples from a pipe are streamed until it ends") {
   CHECK(robot.answered({"history", "forearm_link"}).at("samples") == 200);
 }
 
+TEST_CASE("values: a first line that is neither JSON nor names of columns is told") {
+  const Robot robot;
+  for (const char* text : {"this is garbage\n", "[1,2]\n", "\x01\x02\n"}) {
+    const CliResult sent = robot.domain.cli({"publish", robot.directory.write("moves", text)});
+    CHECK(sent.status == 1);
+    CHECK_THAT(sent.err, ContainsSubstring("tfdude: line 1: "));
+  }
+  const std::string csv =
+      "\xef\xbb\xbf"
+      "elbow_joint\n0.25\n";
+  CHECK(robot.answered({"publish", robot.directory.write("moves.csv", csv)}).at("lines") == 1);
+  CHECK(eventually([&] { return robot.position("elbow_joint") == 0.25; }));
+}
+
 TEST_CASE("values: publishing a pipe ends at an interrupt and tells what was sent") {
   const Robot robot;
   const std::string pipe = robot.directory.path() + "/pipe";
@@ -258,7 +272,12 @@ TEST_CASE("values: frames of a calibration are imported, updated and exported") 
   const json text = robot.answered({"export", "-", "--format", "ros2"});
   CHECK_THAT(text.at("text").get<std::string>(),
              ContainsSubstring("--frame-id tool0 --child-frame-id head_cam0"));
-  CHECK(robot.domain.cli({"export", "-", "nobody", "--format", "ros2"}).status == 1);
+  const CliResult nobody = robot.domain.cli({"export", "-", "head_cam2", "--format", "ros2"});
+  CHECK(nobody.status == 1);
+  CHECK_THAT(nobody.err, ContainsSubstring("no frame 'head_cam2'; did you mean head_cam"));
+  const CliResult twice = robot.domain.cli(
+      {"import", camchain("-0.1"), "--dry-run", "--name", "imu0=a", "--name", "imu0=b"});
+  CHECK_THAT(twice.err, ContainsSubstring("--name 'imu0' is given twice"));
   const CliResult exact = robot.domain.cli({"export", out, "head_cam1", "--format", "g2o"});
   CHECK(exact.status == 1);
   CHECK_THAT(exact.err, ContainsSubstring("an axis is known exactly"));

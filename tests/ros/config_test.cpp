@@ -176,6 +176,38 @@ detections_in:
              ContainsSubstring("type is none of"));
 }
 
+TEST_CASE("ros config: what would count twice, or for nothing, is rejected") {
+  for (const char* topic : {"a b", "", "/", "//a", "/a/", "/a//b", "/1a", "~/a", "/a-b", "{x}"}) {
+    INFO(topic);
+    const std::string entry = "[{topic: \"" + std::string(topic) + "\", child: a}]\n";
+    for (const char* section : {"values_in: ", "poses_in: "}) {
+      CHECK_THAT(error_of(section + entry), ContainsSubstring("is no name of a topic"));
+    }
+  }
+  CHECK(error_of("poses_in: [{topic: a_1/B, child: a}, {topic: /a_1/B, child: b}]\n").empty());
+  for (const char* section : {"values_in: ", "poses_in: "}) {
+    CHECK_THAT(error_of(std::string(section) + "[{topic: /p, child: a}, {topic: p, child: a}]\n"),
+               ContainsSubstring("[1]: an entry before has this topic and child"));
+  }
+  const std::string tags = "topic: /t, type: aruco";
+  CHECK_THAT(error_of("detections_in: [{" + tags + ", frame: dock}]\n"),
+             ContainsSubstring("frame needs {}, the object's id, unless ids is one name"));
+  CHECK_THAT(error_of("detections_in: [{" + tags + ", frame: dock, ids: ['7*']}]\n"),
+             ContainsSubstring("frame needs {}"));
+  CHECK(error_of("detections_in: [{" + tags + ", frame: dock, ids: ['7']}]\n").empty());
+}
+
+TEST_CASE("ros config: the robot of a description is a partition of its own") {
+  Settings settings;
+  REQUIRE(parse_config("partition: x\ndescription_in: {partition: x}\n", "f", settings));
+  const auto same = check_partitions(settings);
+  REQUIRE_FALSE(same);
+  CHECK_THAT(same.error().message, ContainsSubstring("description_in needs another one"));
+  settings.partition = "y";
+  CHECK(check_partitions(settings));
+  CHECK(check_partitions(Settings()));
+}
+
 TEST_CASE("ros config: what is left out stays as it is") {
   Settings settings;
   REQUIRE(parse_config("partition: x\n", "f", settings));

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/base/number.hpp"
 
 #include "../logic/names.hpp"
@@ -38,6 +39,12 @@ class Mapping : private YamlFields {
   Mapping& words(Key key, std::string& out) {
     if (ok_ && has(key)) store(text(field(key), what(key)), out);
     return *this;
+  }
+  Mapping& topic(std::string& out) {
+    words("topic", out);
+    if (!ok_ || is_topic(out)) return *this;
+    return fail(Errc::kInvalidInput, what("topic") + " " + quote(out) + " is no name of a topic",
+                "topic");
   }
   Mapping& flag(Key key, bool& out) {
     if (ok_) ok_ = YamlFields::flag(entries_, key, place_, out);

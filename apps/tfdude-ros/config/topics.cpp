@@ -1,5 +1,6 @@
 #include "topics.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <map>
 
@@ -36,6 +37,21 @@ Result<void> variances(const std::string& file, const YAML::Node* node, const st
   return {};
 }
 
+// Whether the newest entry takes what one before takes, so that each message would count twice.
+template <class Entry>
+bool is_repeated(const std::vector<Entry>& all) {
+  return std::any_of(all.begin(), all.end() - 1, [&](const Entry& one) {
+    return without_slashes(one.topic) == without_slashes(all.back().topic) &&
+           one.child == all.back().child;
+  });
+}
+// Whether a list of patterns is a single name.
+bool is_one_name(const YAML::Node* ids) {
+  return ids != nullptr && ids->size() == 1 && (*ids)[0].Scalar().find('*') == std::string::npos;
+}
+
+constexpr const char* kRepeated = ": an entry before has this topic and child";
+
 }  // namespace
 
 Result<void> values_in(const Section& section, Settings& settings) {
@@ -43,7 +59,7 @@ Result<void> values_in(const Section& section, Settings& settings) {
   const auto read = [&](ValueIn& in, const YAML::Node& node, const std::string& place) {
     Mapping entries(section.file, node, kKeys, place);
     entries.require("topic")
-        .words("topic", in.topic)
+        .topic(in.topic)
         .words("child", in.child)
         .words("edge", in.edge)
         .type(in.odometry, in.geodetic, in.frame);
@@ -53,6 +69,7 @@ Result<void> values_in(const Section& section, Settings& settings) {
                   ": edge is the child itself: leave it out");
     entries.check(in.edge.empty() || in.geodetic != MessageType::kNavSatFix, Errc::kInvalidInput,
                   ": edge needs a pose, and navsat is a position only");
+    entries.check(!is_repeated(settings.values_in), Errc::kInvalidInput, kRepeated);
     if (!entries.result()) return entries.result();
     return variances(section.file, entries.value("covariance"), place, in.variances);
   };
@@ -72,7 +89,7 @@ Result<void> detections_in(const Section& section, Settings& settings) {
     Mapping entries(section.file, node, kKeys, place);
     entries.require("topic")
         .require("type")
-        .words("topic", in.topic)
+        .topic(in.topic)
         .words("type", type)
         .words("frame", in.frame)
         .patterns("ids", in.ids.include)
@@ -89,6 +106,9 @@ Result<void> detections_in(const Section& section, Settings& settings) {
     entries.check(!is_tf || !in.ids.include.empty(), Errc::kInvalidInput,
                   ": ids is missing, the names of the transforms that are objects");
     if (in.frame.empty()) in.frame = is_tf ? "{}" : "tag_{}";
+    const bool names_each = in.frame.find("{}") != std::string::npos;
+    entries.check(names_each || is_one_name(entries.value("ids")), Errc::kInvalidInput,
+                  ": frame needs {}, the object's id, unless ids is one name");
     if (!entries.result()) return entries.result();
     return variances(section.file, entries.value("covariance"), place, in.variances);
   };
@@ -102,7 +122,7 @@ Result<void> poses_in(const Section& section, Settings& settings) {
     bool correlated = false;
     Mapping entries(section.file, node, kKeys, place);
     entries.require("topic")
-        .words("topic", in.topic)
+        .topic(in.topic)
         .words("child", in.child)
         .within("gate", 1e-9, 1, in.options.gate)
         .flag("correlated", correlated)
@@ -110,6 +130,7 @@ Result<void> poses_in(const Section& section, Settings& settings) {
     entries.check(in.odometry == in.child.empty(), Errc::kInvalidInput,
                   in.odometry ? ": odometry names the child itself"
                               : ": child is missing, the frame that is measured");
+    entries.check(!is_repeated(settings.poses_in), Errc::kInvalidInput, kRepeated);
     in.options.independent = !correlated;
     if (!entries.result()) return entries.result();
     return variances(section.file, entries.value("covariance"), place, in.variances);
@@ -124,7 +145,7 @@ Result<void> poses_out(const Section& section, Settings& settings) {
         .require("topic")
         .require("frame")
         .require("child")
-        .words("topic", out.topic)
+        .topic(out.topic)
         .words("frame", out.frame)
         .words("child", out.child)
         .within("rate", 0, kMaxRate, out.rate)

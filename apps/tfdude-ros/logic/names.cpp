@@ -52,6 +52,18 @@ std::optional<std::string> ros_name_of(std::string_view id, std::string_view pre
   return std::string(id.substr(prefix.size()));
 }
 
+bool is_topic(std::string_view name) {
+  if (!name.empty() && name.front() == '/') name.remove_prefix(1);
+  char before = '/';
+  for (const char c : name) {
+    const bool is_digit = c >= '0' && c <= '9';
+    const bool is_letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+    if (before == '/' ? !is_letter : !(is_letter || is_digit || c == '/')) return false;
+    before = c;
+  }
+  return before != '/';
+}
+
 Result<Pose> pose_of(const RosPose& pose) {
   const auto& [x, y, z, w] = pose.quat;
   return pose_of(Eigen::Quaterniond(w, x, y, z),

@@ -44,6 +44,9 @@ struct Choice {
 /// The inverse. @return none for a frame without the prefix: it has no name in ROS
 [[nodiscard]] std::optional<std::string> ros_name_of(std::string_view id, std::string_view prefix);
 
+/// Whether ROS 2 accepts this as the name of a topic, absolute or not.
+[[nodiscard]] bool is_topic(std::string_view name);
+
 /// By the rules of recordings of ROS. @return kInvalidInput naming the field.
 [[nodiscard]] Result<Pose> pose_of(const RosPose& pose);
 [[nodiscard]] RosPose ros_pose_of(const Pose& pose);

@@ -52,7 +52,9 @@ struct Export final : Question {
     const auto all = source.frames();
     if (!all) return tl::unexpected(all.error());
     std::map<std::string, std::string> parents;
+    std::set<std::string> known;
     for (const Frame& frame : *all) {
+      known.insert(frame.id);
       if (frame.attached) parents[frame.id] = frame.parent;
     }
     std::vector<FrameSpec> frames;
@@ -60,6 +62,9 @@ struct Export final : Question {
       FrameSpec frame;
       frame.id = id;
       frame.parent = in.empty() ? parents[id] : in;
+      if (frame.parent.empty() && known.count(id) == 0) {
+        return fail(Errc::kUnknownFrame, "no frame " + quote(id));
+      }
       if (frame.parent.empty()) {
         return fail(Errc::kUnknownFrame, "frame " + quote(id) + " has no parent; say --in FRAME");
       }

@@ -89,7 +89,10 @@ struct Import final : LiveCommand {
     }
     for (const std::string& text : names) {
       const auto at = text.find('=');
-      read.names[text.substr(0, at)] = text.substr(at + 1);
+      const std::string name = text.substr(0, at);
+      if (!read.names.emplace(name, text.substr(at + 1)).second) {
+        return fail(Errc::kInvalidInput, "--name " + quote(name) + " is given twice");
+      }
     }
     const auto given = in_radians(spec, common.angles).build();
     if (!given) return tl::unexpected(given.error());

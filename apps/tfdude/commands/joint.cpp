@@ -95,9 +95,15 @@ struct Joint final : LiveCommand {
     const auto updated = client.update_joints(*values, *at);
     if (!updated) return report_cause(client, updated.error(), common);
     auto json = nlohmann::json::array();
+    auto ignored = nlohmann::json::array();
     std::string text;
     for (const JointValue& value : *values) {
       const auto joint = known.find(value.name);
+      if (joint != known.end() && joint->second.mimic) {
+        ignored.push_back(value.name);
+        text += "ignored " + value.name + ": it follows " + joint->second.mimic->joint + "\n";
+        continue;
+      }
       json.push_back({{"name", value.name}, {"position", value.position}});
       text += "moved " + value.name;
       if (joint != known.end()) {
@@ -107,7 +113,9 @@ struct Joint final : LiveCommand {
       }
       text += "\n";
     }
-    return answer(common, {{"done", "moved"}, {"joints", std::move(json)}}, text);
+    return answer(common,
+                  {{"done", "moved"}, {"joints", std::move(json)}, {"ignored", std::move(ignored)}},
+                  text);
   }
 
   std::vector<std::string> words;  // a name and a position, or NAME=POSITION each

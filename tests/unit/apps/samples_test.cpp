@@ -61,6 +61,15 @@ TEST_CASE("samples: wrong lines of JSON are named and the next one is read") {
   (void)read(reader, R"({"joints": {"elbow": 1}})");
   const std::pair<const char*, const char*> wrong[] = {
       {"{", "not an object of JSON"},
+      {R"({"edge": "a", "xyz": [0, 0, 1]} b)", "not an object of JSON"},
+      {R"({"edge": "a", "edge": "b", "xyz": [0, 0, 1]})", "key 'edge' is given twice"},
+      {R"({"edge": "a", "xyz": [0, 0, 1], "xyz": [0, 0, 2]})", "key 'xyz' is given twice"},
+      {R"({"joints": {"elbow": 1, "elbow": 2}})", "key 'elbow' is given twice"},
+      {R"({"edges": [{"edge": "a", "xyz": [0, 0, 1]}, {"edge": "a", "xyz": [0, 0, 2]}]})",
+       "edge 'a' is given twice"},
+      {R"({"edges": [{"edge": "a", "xyz": [0, 0, 1], "stamp": 1}]})",
+       "edge 'a': the stamp stands beside"},
+      {R"({"joints": {"elbow": 1}, "stamp": 1, "stamp_ns": 1})", "both given"},
       {"[1]", "not an object of JSON"},
       {"{}", "neither an edge nor a joint"},
       {R"({"edge": 3, "xyz": [0, 0, 0]})", "an edge needs its frame"},
@@ -110,11 +119,36 @@ TEST_CASE("samples: wrong names of CSV columns are named") {
       {"elbow,,wrist", "column 2 has no name"},
       {"edge,x,y", "of the columns x to z some are missing"},
       {"edge,x,y,z,speed", "column 'speed' is not known"},
-      {"edge,stamp", "no column of a pose"}};
+      {"edge,stamp", "no column of a pose"},
+      {"stamp,elbow,stamp_ns", "both given"},
+      {"[1,2]", "'[1' is no name of a column"},
+      {"\"a\": 1", "is no name of a column"},
+      {"0.5,0.25", "'0.5' is no name of a column"},
+      {"\x01\x02", "holds a control character"},
+      {"\xff\xfe", "is not valid UTF-8"}};
   for (const auto& [line, message] : wrong) {
+    INFO(line);
     SampleReader reader(kRadian);
     CHECK_THAT(refusal(reader, line), ContainsSubstring(message));
+    CHECK(reader.finish());
+    // No later line is taken for names, and what is JSON is read.
+    CHECK(refusal(reader, "elbow,wrist") == "the names of the columns were wrong");
+    CHECK(refusal(reader, "0.5") == "the names of the columns were wrong");
+    CHECK(read(reader, R"({"joints": {"elbow": 1}})").joints.size() == 1);
+    CHECK(refusal(reader, "elbow,wrist") == "not an object of JSON");
   }
+}
+
+TEST_CASE("samples: names without values are an error at the end") {
+  SampleReader reader(kRadian);
+  CHECK(reader.finish());
+  CHECK(reader.read("this is garbage").value() == std::nullopt);
+  CHECK(reader.read(" ").value() == std::nullopt);
+  const auto ended = reader.finish();
+  REQUIRE_FALSE(ended);
+  CHECK_THAT(ended.error().message, ContainsSubstring("no row follows the names of the columns"));
+  CHECK(read(reader, "0.5").joints[0].name == "this is garbage");
+  CHECK(reader.finish());
 }
 
 TEST_CASE("samples: degrees are converted where a number is an angle") {

@@ -1,0 +1,334 @@
+// Commands of shell scripts that start static_transform_publisher.
+
+#include <algorithm>
+#include <cctype>
+#include <initializer_list>
+#include <utility>
+
+#include "description/file_edges.hpp"
+#include "description/file_text.hpp"
+#include "description/launch_starts.hpp"
+
+namespace tfdude {
+namespace {
+
+struct ShellWord {
+  std::string text;          // without its quotes
+  bool is_expanded = false;  // the shell replaces a part of it
+};
+
+// A simple command: without its redirections, and up to what divides it from the next.
+struct ShellCommand {
+  std::vector<ShellWord> words;
+  int line = 0;
+  int mention = 0;  // the line of a here-document that names the program; 0: none
+};
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+bool is_program(std::string_view word) {
+  const std::string_view program = kStaticPublisher;
+  if (word.size() < program.size()) return false;
+  const auto begin = word.size() - program.size();
+  return word.substr(begin) == program && (begin == 0 || word[begin - 1] == '/');
+}
+
+// Whether a text of several words has that of the program.
+bool mentions(std::string_view text) {
+  if (text.find(kStaticPublisher) == std::string_view::npos) return false;
+  const auto has_program = [](std::string_view line) {
+    const auto words = words_of(line);
+    return std::any_of(words.begin(), words.end(), is_program);
+  };
+  TextLines lines(text);
+  while (lines.next()) {
+    if (has_program(lines.line())) return true;
+  }
+  return false;
+}
+
+// Reads each character once or twice, and does not call itself, so that no input takes the stack.
+class ShellCommands {
+ public:
+  ShellCommands(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+
+  [[nodiscard]] Result<std::vector<ShellCommand>> all() {
+    while (at_ < text_.size()) {
+      Result<void> ok;
+      if (joins_lines()) {
+        join_lines();
+      } else if (is_blank(here())) {
+        ++at_;
+      } else if (here() == '\n') {
+        ok = end_line();
+      } else if (here() == '#') {
+        at_ = std::min(text_.find('\n', at_), text_.size());
+      } else if (const auto size = size_of_redirection(); size > 0) {
+        ok = redirection(size);
+      } else if (is_one_of(here(), ";&|()")) {
+        end_command();
+        ++at_;
+      } else {
+        begin_command();
+        ok = word(command_.words.emplace_back());
+      }
+      if (!ok) return tl::unexpected(std::move(ok.error()));
+    }
+    if (auto ok = end_line(); !ok) return tl::unexpected(std::move(ok.error()));
+    return std::move(commands_);
+  }
+
+ private:
+  struct HereDocument {
+    std::string end;
+    bool is_indented = false;
+    int line = 0;
+    std::size_t command = 0;  // whose input it is
+  };
+
+  [[nodiscard]] static bool is_one_of(char c, std::string_view characters) {
+    return characters.find(c) != std::string_view::npos;
+  }
+  [[nodiscard]] char here(std::size_t ahead = 0) const {
+    return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\n';
+  }
+  [[nodiscard]] tl::unexpected<Error> error(int line, const std::string& what) const {
+    return file_error(Errc::kConfig, file_, line, what + " has no end");
+  }
+
+  // A backslash at the end of a line.
+  [[nodiscard]] bool joins_lines() const {
+    return here() == '\\' && here(here(1) == '\r' ? 2 : 1) == '\n';
+  }
+  void join_lines() {
+    at_ += here(1) == '\r' ? 3U : 2U;
+    ++line_;
+  }
+
+  void begin_command() {
+    if (command_.line == 0) command_.line = line_;
+  }
+
+  void end_command() {
+    if (command_.line == 0) return;
+    commands_.push_back(std::exchange(command_, {}));
+  }
+
+  // The here-documents of a line stand below it.
+  [[nodiscard]] Result<void> end_line() {
+    end_command();
+    ++at_;
+    ++line_;
+    for (const HereDocument& document : std::exchange(documents_, {})) {
+      bool is_ended = false;
+      while (!is_ended && at_ < text_.size()) {
+        const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+        std::string_view line = text_.substr(at_, end - at_);
+        if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+        const std::size_t tabs = line.find_first_not_of('\t');
+        if (document.is_indented) line.remove_prefix(std::min(tabs, line.size()));
+        is_ended = line == document.end;
+        ShellCommand& command = commands_[document.command];
+        if (command.mention == 0 && mentions(line)) command.mention = line_;
+        at_ = end + 1;
+        ++line_;
+      }
+      if (!is_ended) return error(document.line, "a here-document");
+    }
+    return {};
+  }
+
+  // Of the operator, as in 2>&1, &>>log or <<EOF.
+  [[nodiscard]] std::size_t size_of_redirection() const {
+    std::size_t size = 0;
+    if (here() == '&') {
+      size = 1;
+    } else {
+      while (std::isdigit(static_cast<unsigned char>(here(size))) != 0) ++size;
+    }
+    const char direction = here(size);
+    if (direction != '>' && (direction != '<' || here() == '&')) return 0;
+    while (here(size) == direction) ++size;
+    return is_one_of(here(size), direction == '<' ? "&->" : "&|") ? size + 1 : size;
+  }
+
+  [[nodiscard]] Result<void> redirection(std::size_t size) {
+    begin_command();
+    const std::string_view sign = text_.substr(at_, size);
+    at_ += size;
+    while (is_blank(here())) ++at_;
+    ShellWord target;
+    const int line = line_;
+    if (!is_one_of(here(), "\n;&|()<>")) {
+      if (auto ok = word(target); !ok) return ok;
+    }
+    const auto signs = std::count(sign.begin(), sign.end(), '<');
+    if (signs == 2) {
+      documents_.push_back({target.text, sign.back() == '-', line, commands_.size()});
+    } else if (signs == 3 && mentions(target.text)) {
+      command_.mention = line;
+    }
+    return {};
+  }
+
+  [[nodiscard]] Result<void> word(ShellWord& word) {
+    while (!is_blank(here()) && !is_one_of(here(), "\n;&|()<>")) {
+      Result<void> ok;
+      if (joins_lines()) {
+        join_lines();
+      } else if (here() == '\\') {
+        word.text += here(1);
+        at_ += 2;
+      } else if (here() == '\'') {
+        ok = quoted(word);
+      } else if (here() == '"') {
+        ok = doubly_quoted(word);
+      } else {
+        ok = plain(word);
+      }
+      if (!ok) return ok;
+    }
+    return {};
+  }
+
+  void take(ShellWord& word) {
+    if (here() == '\n') ++line_;
+    word.text += text_[at_++];
+  }
+
+  [[nodiscard]] Result<void> quoted(ShellWord& word) {
+    const int line = line_;
+    for (++at_; here_is_inside('\'');) take(word);
+    if (at_ >= text_.size()) return error(line, "a quote");
+    ++at_;
+    return {};
+  }
+
+  [[nodiscard]] Result<void> doubly_quoted(ShellWord& word) {
+    const int line = line_;
+    for (++at_; here_is_inside('"');) {
+      if (joins_lines()) {
+        join_lines();
+        continue;
+      }
+      if (here() == '\\' && is_one_of(here(1), "$`\"\\")) {
+        ++at_;
+        take(word);
+      } else if (auto ok = plain(word); !ok) {
+        return ok;
+      }
+    }
+    if (at_ >= text_.size()) return error(line, "a quote");
+    ++at_;
+    return {};
+  }
+
+  [[nodiscard]] bool here_is_inside(char quote) const {
+    return at_ < text_.size() && text_[at_] != quote;
+  }
+
+  // A character that is no quote, or what the shell replaces.
+  [[nodiscard]] Result<void> plain(ShellWord& word) {
+    const int line = line_;
+    if (here() == '`') {
+      word.is_expanded = true;
+      do take(word);
+      while (here_is_inside('`'));
+      if (at_ >= text_.size()) return error(line, "a substitution");
+    } else if (here() == '$') {
+      word.is_expanded = true;
+      if (here(1) == '(') return substitution(word);
+    }
+    take(word);
+    return {};
+  }
+
+  // $(command), or $((expression)).
+  [[nodiscard]] Result<void> substitution(ShellWord& word) {
+    const int line = line_;
+    std::size_t open = 0;
+    do {
+      take(word);
+      if (at_ >= text_.size()) return error(line, "a substitution");
+      if (here() == '(') ++open;
+      if (here() == ')') --open;
+    } while (open > 0);
+    take(word);
+    return {};
+  }
+
+  std::string_view text_;
+  const std::string& file_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+  ShellCommand command_;
+  std::vector<ShellCommand> commands_;
+  std::vector<HereDocument> documents_;
+};
+
+// The word that says what a command does.
+std::string_view name_of(const ShellCommand& command) {
+  constexpr std::string_view kBefore[] = {"then", "do", "else", "{", "!", "time"};
+  for (const ShellWord& word : command.words) {
+    if (std::find(std::begin(kBefore), std::end(kBefore), word.text) == std::end(kBefore)) {
+      return word.text;
+    }
+  }
+  return {};
+}
+
+bool is_one_of(std::string_view name, std::initializer_list<std::string_view> names) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// How many more blocks a command begins than it ends: conditions and loops.
+int opened_by(std::string_view name) {
+  if (is_one_of(name, {"if", "for", "while", "until", "case"})) return 1;
+  return is_one_of(name, {"fi", "done", "esac"}) ? -1 : 0;
+}
+
+// Whether the command only prints, or looks for, what it is given.
+bool is_about_text(std::string_view name) {
+  return is_one_of(name, {"echo", "printf", "cat", "tee", "grep", "pgrep", "pkill", "killall"});
+}
+
+}  // namespace
+
+Result<std::vector<LaunchStart>> starts_in_shell(const std::string& text, const std::string& name) {
+  const auto commands = ShellCommands(text, name).all();
+  if (!commands) return tl::unexpected(commands.error());
+  const auto error = [&](int line, const std::string& message) {
+    return file_error(Errc::kInvalidInput, name, line, kStaticPublisher + message);
+  };
+  std::vector<LaunchStart> starts;
+  int blocks = 0;
+  for (const ShellCommand& command : *commands) {
+    const std::string_view what = name_of(command);
+    blocks += opened_by(what);
+    if (is_about_text(what)) continue;
+    int mention = command.mention;
+    auto program = command.words.end();
+    for (auto word = command.words.begin(); word != command.words.end(); ++word) {
+      if (program == command.words.end() && is_program(word->text)) program = word;
+      const bool is_text = !is_program(word->text) && mentions(word->text);
+      if (mention == 0 && is_text) mention = command.line;
+    }
+    if (mention != 0) {
+      return error(mention, " stands in a text here: write its start as a command of its own");
+    }
+    if (program == command.words.end()) continue;
+    if (blocks > 0) {
+      return error(command.line, " is started under a condition, or in a loop: write what happens");
+    }
+    const bool of_tf = program != command.words.begin() && (program - 1)->text == "tf";
+    LaunchStart start{{}, of_tf, command.line};
+    for (auto word = program + 1; word != command.words.end(); ++word) {
+      if (word->is_expanded) return error(command.line, ": " + launch_substitution(word->text));
+      start.words.push_back(word->text);
+    }
+    starts.push_back(std::move(start));
+  }
+  return starts;
+}
+
+}  // namespace tfdude
