@@ -13,7 +13,8 @@ struct Drift {
 };
 
 /// Of an edge that drifts: it has moved from one value to the other as it was told (F is the
-/// adjoint of that motion's inverse), and w is what the drift has added.
+/// adjoint of that motion's inverse), and w is what the drift has added, or an upper bound where
+/// the two values differ by less than what is added without a lever.
 /// @return nothing if the later value does not follow from the earlier one, as an observation has
 ///   corrected it alone
 [[nodiscard]] std::optional<Drift> drift_between(const Belief& earlier, const Belief& later);

@@ -27,11 +27,13 @@ struct EdgeFromFixed {
                                                                   const Query& query);
 
 /// The pose of b in a, each at an instant of its own, from their poses in a fixed frame. The stamp
-/// is that of b; the unspecified edges are in the order of the path from a to b.
+/// is that of b; the unspecified edges are in the order of the path from a to b, each once.
 ///
-/// A static edge on both paths has the same error twice; that of one that drifts follows from the
-/// earlier one (drift_between()). The errors of another dynamic edge at two instants may be
-/// correlated in any way: the covariance is an upper bound.
+/// A static edge on both paths has the same error twice, up to the first dynamic one it cancels;
+/// that of one that drifts follows from the earlier one (drift_between()). The errors of another
+/// dynamic edge at two instants may be correlated in any way, and so may those of a source that it
+/// names: the covariance is an upper bound. Its share is bound() of its own two, as different edges
+/// err independently, unless an observation has tied it to others.
 /// @param to_a, to_b  may be empty if no edge is on both paths
 [[nodiscard]] StampedTransform over_fixed(const StampedTransform& X_FA,
                                           const StampedTransform& X_FB,
