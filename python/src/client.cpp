@@ -174,9 +174,12 @@ Options to_options(const OpenArguments& arguments) {
   if (arguments.profile) options.profile = *arguments.profile;
   if (arguments.discovery_server) options.discovery_server = *arguments.discovery_server;
   if (arguments.keys) options.keys = *arguments.keys;
-  if (!arguments.timeout.is_none()) options.timeout = to_milliseconds(arguments.timeout, "timeout");
+  if (!arguments.timeout.is_none()) {
+    options.timeout = not_negative(to_milliseconds(arguments.timeout, "timeout"), "timeout");
+  }
   if (!arguments.discovery.is_none()) {
-    options.discovery = to_milliseconds(arguments.discovery, "discovery");
+    options.discovery =
+        not_negative(to_milliseconds(arguments.discovery, "discovery"), "discovery");
   }
   options.follow = arguments.follow;
   // The environment may have switched it off.
