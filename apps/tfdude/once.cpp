@@ -53,7 +53,10 @@ void add_options(CLI::App& app, Typed& typed) {
   CLI::App* lookup = app.add_subcommand("lookup");
   typed.path.add_ends(*lookup);
   typed.path.add_printing(*lookup);
-  lookup->add_option("--at", typed.at);
+  // The whole program says that no text is no number.
+  lookup->add_option("--at", typed.at)->check([](const std::string& text) {
+    return std::string(text.empty() ? "is empty" : "");
+  });
   CLI::App* exists = app.add_subcommand("exists");
   exists->add_option("ID", typed.path.a)->required();
   exists->callback([&typed] { typed.exists = true; });

@@ -36,7 +36,9 @@ void add_rate(CLI::App& app, double& rate, const char* help) {
 
 void add_order(CLI::App& app, int& order) {
   app.add_option("--order", order, "order of covariance propagation: 2 or 4")
-      ->check(CLI::IsMember({2, 4}));
+      ->check([](const std::string& text) {
+        return text == "2" || text == "4" ? std::string() : "'" + text + "' is neither 2 nor 4";
+      });
 }
 
 CLI::Option* add_watch(CLI::App& app, Command& command, bool& watch) {

@@ -178,9 +178,12 @@ Options to_options(const OpenArguments& arguments) {
   if (arguments.profile) options.profile = *arguments.profile;
   if (arguments.discovery_server) options.discovery_server = *arguments.discovery_server;
   if (arguments.keys) options.keys = *arguments.keys;
-  if (!arguments.timeout.is_none()) options.timeout = to_milliseconds(arguments.timeout, "timeout");
+  if (!arguments.timeout.is_none()) {
+    options.timeout = not_negative(to_milliseconds(arguments.timeout, "timeout"), "timeout");
+  }
   if (!arguments.discovery.is_none()) {
-    options.discovery = to_milliseconds(arguments.discovery, "discovery");
+    options.discovery =
+        not_negative(to_milliseconds(arguments.discovery, "discovery"), "discovery");
   }
   // The environment may have switched it off.
   options.shared_memory = options.shared_memory && arguments.shared_memory;

@@ -61,7 +61,7 @@ CloudQuery to_cloud_query(py::handle at, py::handle stamps, py::handle group,
                           const std::string& fixed, bool covariances, py::handle own) {
   CloudQuery query;
   query.lookup.at = to_stamp(at, "at");
-  if (!stamps.is_none()) query.stamps = to_instants(stamps);
+  if (!stamps.is_none()) query.stamps = to_instants(stamps, "stamps");
   query.group = to_duration(group, "group");
   query.fixed = fixed;
   query.covariances = covariances;

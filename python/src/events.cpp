@@ -1,3 +1,5 @@
+#include <limits>
+
 #include <pybind11/stl.h>
 
 #include "tfdude/types/change.hpp"
@@ -157,6 +159,14 @@ void bind_clock(ClientClass& cls) {
 }  // namespace
 
 void bind_events(py::module_& module, ClientClass& cls) {
+  module.def(
+      "_seconds",
+      [](py::handle duration, const char* what) {
+        const Milliseconds wait = to_milliseconds(duration, what);
+        if (wait == Milliseconds::max()) return std::numeric_limits<double>::infinity();
+        return to_seconds(to_duration(duration, what));
+      },
+      py::arg("duration"), py::arg("what"));
   py::class_<Mailbox, MailboxPtr>(module, "_Mailbox")
       .def(py::init<>())
       .def("fileno", &Mailbox::fd)

@@ -3,6 +3,7 @@
 #include "bind.hpp"
 #include "client.hpp"
 #include "points.hpp"
+#include "possible.hpp"
 #include "waiting.hpp"
 
 namespace tfdude::python {
@@ -27,11 +28,6 @@ void await_lookup(const Session& session, const std::string& a, const std::strin
                   const Query& query, Milliseconds wait) {
   if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(session, a, b, query, wait));
 }
-
-/// Whether a lookup would succeed, or why not.
-struct Possible {
-  std::optional<Error> why_not;
-};
 
 Possible can_lookup(const Session& session, const std::string& a, const std::string& b,
                     const Query& query, Milliseconds wait) {

@@ -252,50 +252,6 @@ void bind_trajectory(py::module_& module) {
       });
 }
 
-/// Of datetime64: numpy does not tell if an instant cannot be counted in nanoseconds.
-void check_years(const py::array& dates) {
-  using Years = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
-  const Years years(dates.attr("astype")("datetime64[Y]").attr("view")("int64"));  // from 1970
-  for (py::ssize_t i = 0; i < years.size(); ++i) {
-    const std::int64_t year = years.data()[i];
-    if (year >= 1678 - 1970 && year <= 2261 - 1970) continue;
-    const bool is_time = year != std::numeric_limits<std::int64_t>::min();  // how numpy has NaT
-    throw py::value_error("instant " + std::to_string(i) +
-                          (is_time ? " is out of range" : " is NaT: not a time"));
-  }
-}
-
-/// The numbers of an array as instants; empty: it has others.
-std::optional<std::vector<Time>> of_array(py::handle at) {
-  if (!py::isinstance<py::array>(at)) return std::nullopt;
-  auto array = py::reinterpret_borrow<py::array>(at);
-  if (array.ndim() != 1) return std::nullopt;
-  char kind = array.dtype().kind();
-  const auto count = static_cast<std::size_t>(array.shape(0));
-  std::vector<Time> instants(count);
-  if (kind == 'M') {
-    check_years(array);
-    array = array.attr("astype")("datetime64[ns]").attr("view")("int64");
-    kind = 'i';
-  }
-  if (kind == 'i' || kind == 'u') {
-    const auto ns = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(array);
-    std::transform(ns.data(), ns.data() + count, instants.begin(),
-                   [](std::int64_t t) { return time_of(t); });
-    return instants;
-  }
-  if (kind != 'f') return std::nullopt;
-  const auto seconds = Doubles(array);
-  for (std::size_t i = 0; i < count; ++i) {
-    const double ns = std::round(seconds.data()[i] * 1e9);
-    if (!(std::abs(ns) < 9.2e18)) {
-      throw py::value_error("instant " + std::to_string(i) + " is out of range");
-    }
-    instants[i] = time_of(static_cast<std::int64_t>(ns));
-  }
-  return instants;
-}
-
 void wait_for(const Session& session, const std::string& a, const std::string& b,
               const Query& query, std::optional<Time> at, Milliseconds wait) {
   if (wait <= Milliseconds(0)) return;
@@ -339,7 +295,7 @@ Batch of_trajectory(Trajectory&& trajectory, const std::vector<Time>& instants) 
 Batch lookup_many(const Session& session, std::vector<FramePair> pairs, py::handle at,
                   py::handle timeout, py::handle extrapolate, int order, bool strict) {
   bool many = false;
-  const auto stamps = to_stamps(at, many);
+  const auto stamps = to_stamps(at, many, "at");
   Query query = to_query(py::none(), extrapolate, py::none(), order);
   const Milliseconds wait = to_milliseconds(timeout, "timeout");
   if (many && pairs.size() > 1 && stamps.size() > 1 && pairs.size() != stamps.size()) {
@@ -377,35 +333,6 @@ Batch lookup_many(const Session& session, std::vector<FramePair> pairs, py::hand
 }
 
 }  // namespace
-
-std::vector<Time> to_instants(py::handle at) {
-  if (auto instants = of_array(at)) return *std::move(instants);
-  if (!py::isinstance<py::iterable>(at)) throw py::type_error("instants must be an array of them");
-  std::vector<Time> instants;
-  for (const py::handle one : py::reinterpret_borrow<py::iterable>(at)) {
-    instants.push_back(to_time(one, "an instant"));
-  }
-  return instants;
-}
-
-bool is_many(py::handle at) {
-  return py::isinstance<py::sequence>(at) ||
-         (py::isinstance<py::array>(at) && py::reinterpret_borrow<py::array>(at).ndim() > 0);
-}
-
-std::vector<std::optional<Time>> to_stamps(py::handle at, bool& many) {
-  many = is_many(at);
-  if (!many) return {to_stamp(at, "at")};
-  std::vector<std::optional<Time>> stamps;
-  if (const auto instants = of_array(at)) {
-    stamps.assign(instants->begin(), instants->end());
-    return stamps;
-  }
-  for (const py::handle one : py::reinterpret_borrow<py::iterable>(at)) {
-    stamps.push_back(to_stamp(one, "an instant"));
-  }
-  return stamps;
-}
 
 py::object trajectory_object(Trajectory trajectory, std::vector<Time> instants) {
   TrajectoryArrays arrays{std::move(trajectory), std::move(instants)};
@@ -450,7 +377,7 @@ void bind_many(py::module_& module, ClientClass& cls) {
       "trajectory",
       [](const Session& session, const std::string& a, const std::string& b, py::handle instants,
          py::handle timeout, py::handle extrapolate, int order) {
-        std::vector<Time> times = to_instants(instants);
+        std::vector<Time> times = to_instants(instants, "instants");
         const Query query = to_query(py::none(), extrapolate, py::none(), order);
         if (!times.empty()) {
           wait_for(session, a, b, query, *std::max_element(times.begin(), times.end()),

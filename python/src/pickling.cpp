@@ -10,12 +10,14 @@
 #include "tfdude/math/earth.hpp"
 #include "tfdude/types/change.hpp"
 #include "tfdude/types/edge.hpp"
+#include "tfdude/types/explanation.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/partition_info.hpp"
 #include "tfdude/types/query.hpp"
 
 #include "bind.hpp"
+#include "possible.hpp"
 
 // Values in pickles, with all digits; copy and deepcopy use the same. A struct is the tuple of its
 // members.
@@ -83,6 +85,22 @@ TFDUDE_MEMBERS(Correlation, &Correlation::unknown, &Correlation::common_errors,
                &Correlation::observed_with);
 TFDUDE_MEMBERS(FrameSpec, &FrameSpec::id, &FrameSpec::parent, &FrameSpec::X_PC, &FrameSpec::timing,
                &FrameSpec::correlation, &FrameSpec::joint);
+TFDUDE_MEMBERS(Interval, &Interval::from, &Interval::until);
+TFDUDE_MEMBERS(Error, &Error::code, &Error::message, &Error::frame, &Error::partition,
+               &Error::available);
+TFDUDE_MEMBERS(Possible, &Possible::why_not);
+TFDUDE_MEMBERS(Cause, &Cause::obstacle, &Cause::frame, &Cause::partition, &Cause::since,
+               &Cause::needs, &Cause::similar, &Cause::clock_ahead, &Cause::error);
+TFDUDE_MEMBERS(VarianceShare, &VarianceShare::name, &VarianceShare::variance,
+               &VarianceShare::share);
+TFDUDE_MEMBERS(PossibleMeasurement, &PossibleMeasurement::a, &PossibleMeasurement::b,
+               &PossibleMeasurement::variance_after);
+TFDUDE_MEMBERS(OwnerAge, &OwnerAge::partition, &OwnerAge::reachable, &OwnerAge::slowest,
+               &OwnerAge::newest, &OwnerAge::age);
+TFDUDE_MEMBERS(Explanation, &Explanation::X_AB, &Explanation::cause, &Explanation::direction,
+               &Explanation::is_rotation, &Explanation::variance, &Explanation::edges,
+               &Explanation::sources, &Explanation::joints, &Explanation::best,
+               &Explanation::assumed_joints, &Explanation::owners);
 
 #undef TFDUDE_MEMBERS
 
@@ -267,6 +285,9 @@ void bind_pickling(py::module_& module) {
   add_to<HistoryInfo>(module, "HistoryInfo");
   add_to<EdgeConsistency>(module, "EdgeConsistency");
   add_to<Observed>(module, "Observed");
+  add_to<Possible>(module, "Possible");
+  add_to<Cause>(module, "Cause");
+  add_to<Explanation>(module, "Explanation");
   add_to<JointSpec>(module, "Joint");
   add_to<JointInfo>(module, "JointInfo");
   add_to<FrameSpec>(module, "FrameSpec");

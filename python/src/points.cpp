@@ -40,6 +40,16 @@ Eigen::Matrix3d matrix_at(const double* row_major) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(row_major);
 }
 
+TransformedArray transformed_array(py::object transform, Points points, Order order) {
+  const auto& X_AB = transform.cast<const Transform&>();
+  TransformedArray array{transform, std::move(points), {}, order};
+  {
+    const py::gil_scoped_release others;
+    array.points = tfdude::transform(X_AB, array.given.all, order);
+  }
+  return array;
+}
+
 }  // namespace
 
 Points to_points(py::handle points, py::handle covariance, bool direction) {
@@ -76,14 +86,36 @@ Points to_points(py::handle points, py::handle covariance, bool direction) {
 }
 
 py::object transformed(py::object transform, Points points, Order order) {
-  const auto& X_AB = transform.cast<const Transform&>();
-  TransformedArray array{transform, std::move(points), {}, order};
-  {
-    const py::gil_scoped_release others;
-    array.points = tfdude::transform(X_AB, array.given.all, order);
-  }
-  return py::cast(std::move(array));
+  return py::cast(transformed_array(std::move(transform), std::move(points), order));
 }
+
+namespace {
+
+/// What it was computed from, for a pickle.
+py::tuple given_of(const TransformedArray& array) {
+  const std::vector<Point>& given = array.given.all;
+  std::vector<double> points;
+  std::vector<double> covariances;
+  for (const Point& one : given) {
+    points.insert(points.end(), one.coordinates.data(), one.coordinates.data() + 3);
+    covariances.insert(covariances.end(), one.covariance.data(), one.covariance.data() + 9);
+  }
+  const auto count = static_cast<py::ssize_t>(given.size());
+  return py::make_tuple(array.transform, read_only(points.data(), {count, 3}),
+                        read_only(covariances.data(), {count, 3, 3}), array.given.single,
+                        !given.empty() && given.front().direction, static_cast<int>(array.order));
+}
+
+TransformedArray transformed_again(const py::tuple& state) {
+  if (state.size() != 6 || !py::isinstance<Transform>(state[0])) {
+    throw py::value_error("this was not pickled by this version of tfdude");
+  }
+  Points given = to_points(state[1], state[2], state[4].cast<bool>());
+  given.single = state[3].cast<bool>() && given.all.size() == 1;
+  return transformed_array(state[0], std::move(given), to_order(state[5].cast<int>()));
+}
+
+}  // namespace
 
 void bind_points(py::module_& module) {
   py::class_<TransformedArray>(
@@ -122,6 +154,7 @@ void bind_points(py::module_& module) {
           "transform", [](const TransformedArray& a) { return a.transform; },
           "The Transform by which they came here.")
       .def("__len__", [](const TransformedArray& a) { return a.points.size(); })
+      .def(py::pickle(&given_of, &transformed_again))
       .def("__repr__", [](const TransformedArray& a) {
         return "Points(" + std::to_string(a.points.size()) + ")";
       });

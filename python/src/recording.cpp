@@ -70,7 +70,7 @@ void bind_questions(RecordingClass& cls) {
       "trajectory",
       [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle instants,
          py::handle timeout, int order) {
-        std::vector<Time> times = to_instants(instants);
+        std::vector<Time> times = to_instants(instants, "instants");
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
         Query query;
         query.order = to_order(order);

@@ -1,6 +1,8 @@
 #include <cmath>
+#include <limits>
 
 #include "arguments.hpp"
+#include "waiting.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -12,26 +14,42 @@ constexpr double kNanoseconds = 1e9;
                        std::string(py::str(py::type::handle_of(value).attr("__name__"))));
 }
 
+/// An instant or a duration beyond 292 years, or another number that is none.
+[[noreturn]] void out_of_range(const char* what, py::handle value) {
+  throw py::value_error(std::string(what) + " is out of range: " + std::string(py::str(value)));
+}
+
 std::int64_t nanoseconds_of(double seconds, const char* what) {
   const double ns = std::round(seconds * kNanoseconds);
-  if (!(std::abs(ns) < 9.2e18)) {
-    throw py::value_error(std::string(what) + " is out of range: " + std::to_string(seconds));
-  }
+  if (!(std::abs(ns) < 9.2e18)) out_of_range(what, py::float_(seconds));
   return static_cast<std::int64_t>(ns);
 }
 
-std::int64_t integer(py::handle value) {
+std::int64_t integer(py::handle value, const char* what) {
   const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+  if (!index && PyErr_ExceptionMatches(PyExc_TypeError) != 0) {
+    PyErr_Clear();
+    wrong_type(what, "an integer", value);
+  }
   if (!index) throw py::error_already_set();
-  const std::int64_t number = PyLong_AsLongLong(index.ptr());
+  int overflow = 0;
+  const std::int64_t number = PyLong_AsLongLongAndOverflow(index.ptr(), &overflow);
+  if (overflow != 0) out_of_range(what, index);
   if (number == -1 && PyErr_Occurred() != nullptr) throw py::error_already_set();
   return number;
 }
 
 /// Of a timedelta, exactly.
-std::int64_t of_timedelta(py::handle delta) {
-  return ((integer(delta.attr("days")) * 86400 + integer(delta.attr("seconds"))) * 1'000'000 +
-          integer(delta.attr("microseconds"))) *
+/// @param given  what it is of, for the message
+std::int64_t of_timedelta(py::handle delta, py::handle given, const char* what) {
+  constexpr std::int64_t kDay = 86400;
+  constexpr std::int64_t kMostDays =
+      std::numeric_limits<std::int64_t>::max() / kDay / 1'000'000'000;
+  const std::int64_t days = integer(delta.attr("days"), what);
+  // One less: of the last day only a part can be had.
+  if (std::abs(days) >= kMostDays) out_of_range(what, given);
+  return ((days * kDay + integer(delta.attr("seconds"), what)) * 1'000'000 +
+          integer(delta.attr("microseconds"), what)) *
          1000;
 }
 
@@ -44,17 +62,17 @@ py::object epoch() {
 
 Time to_time(py::handle time, const char* what) {
   constexpr const char* kExpected = "int [ns], float [s] or datetime";
-  if (PyLong_CheckExact(time.ptr())) return time_of(integer(time));
+  if (PyLong_CheckExact(time.ptr())) return time_of(integer(time, what));
   if (PyFloat_Check(time.ptr())) return time_of(nanoseconds_of(time.cast<double>(), what));
   if (PyBool_Check(time.ptr()) || time.is_none()) wrong_type(what, kExpected, time);
-  if (PyIndex_Check(time.ptr())) return time_of(integer(time));
-  if (py::hasattr(time, "nanoseconds")) return time_of(integer(time.attr("nanoseconds")));
+  if (PyIndex_Check(time.ptr())) return time_of(integer(time, what));
+  if (py::hasattr(time, "nanoseconds")) return time_of(integer(time.attr("nanoseconds"), what));
   if (py::isinstance(time, py::module_::import("datetime").attr("datetime"))) {
     if (time.attr("tzinfo").is_none()) {
       throw py::value_error(std::string(what) +
                             ": a datetime needs a time zone, such as timezone.utc");
     }
-    return time_of(of_timedelta(time - epoch()));
+    return time_of(of_timedelta(time - epoch(), time, what));
   }
   wrong_type(what, kExpected, time);
 }
@@ -81,12 +99,14 @@ std::chrono::nanoseconds to_duration(py::handle duration, const char* what) {
     if (PyErr_Occurred() == nullptr) {
       return std::chrono::nanoseconds(nanoseconds_of(seconds, what));
     }
+    const bool too_large = PyErr_ExceptionMatches(PyExc_OverflowError) != 0;
     PyErr_Clear();
+    if (too_large) out_of_range(what, duration);
     if (py::hasattr(duration, "nanoseconds")) {
-      return std::chrono::nanoseconds(integer(duration.attr("nanoseconds")));
+      return std::chrono::nanoseconds(integer(duration.attr("nanoseconds"), what));
     }
     if (py::isinstance(duration, py::module_::import("datetime").attr("timedelta"))) {
-      return std::chrono::nanoseconds(of_timedelta(duration));
+      return std::chrono::nanoseconds(of_timedelta(duration, duration, what));
     }
   }
   wrong_type(what, "a number [s] or timedelta", duration);
@@ -115,7 +135,7 @@ Order to_order(int order) {
 Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
   Query query;
   query.at = to_stamp(at, "at");
-  query.extrapolate = to_duration(extrapolate, "extrapolate");
+  query.extrapolate = not_negative(to_duration(extrapolate, "extrapolate"), "extrapolate");
   query.age_noise_until = to_stamp(age_noise_until, "age_noise_until");
   query.order = to_order(order);
   return query;

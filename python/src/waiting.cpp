@@ -9,6 +9,16 @@ void check_interrupted() {
   check_usable();
 }
 
+Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait) {
+  const auto within = [](Milliseconds time) {
+    return " within " + std::to_string(std::max(time, Milliseconds(0)).count()) + " ms";
+  };
+  const std::string of_slice = within(slice);
+  const std::size_t at = error.message.find(of_slice);
+  if (at != std::string::npos) error.message.replace(at, of_slice.size(), within(wait));
+  return error;
+}
+
 Result<StampedTransform> wait_for_lookup(const Session& session, const std::string& a,
                                          const std::string& b, const Query& query,
                                          Milliseconds wait) {

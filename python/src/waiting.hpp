@@ -9,6 +9,13 @@
 
 namespace tfdude::python {
 
+/// @throws ValueError for a duration below zero, where that is no wait which is over already
+template <class Duration>
+[[nodiscard]] Duration not_negative(Duration duration, const char* what) {
+  if (duration >= Duration::zero()) return duration;
+  throw py::value_error(std::string(what) + " must not be negative");
+}
+
 /// A lookup that waits for its data, without the GIL. Unlike Client::lookup() it also ends when the
 /// process gets a signal, so that Ctrl-C works, and when the interpreter ends.
 [[nodiscard]] Result<StampedTransform> wait_for_lookup(const Session& session, const std::string& a,
@@ -18,6 +25,8 @@ namespace tfdude::python {
 /// Ends a wait without the GIL that looks for these once in a while.
 /// @throws what a signal raises; SystemExit if the interpreter ends
 void check_interrupted();
+/// The error of the last slice of a wait, which names the time of the whole.
+[[nodiscard]] Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait);
 /// How often a wait looks.
 inline constexpr Milliseconds kLook{50};
 
@@ -33,7 +42,11 @@ auto value_after_wait(const Session& session, Milliseconds wait, Call call, MayH
     const auto left = std::chrono::ceil<Milliseconds>(end - Clock::now());
     const auto slice = std::max(std::min(left, kLook), Milliseconds(0));
     auto result = session.call([&](Client& client) { return call(client, slice); });
-    if (result || left <= Milliseconds(0) || !may_help(result.error())) return result;
+    if (result || !may_help(result.error())) return result;
+    if (left <= Milliseconds(0)) {
+      result.error() = of_whole_wait(std::move(result.error()), slice, wait);
+      return result;
+    }
     check_interrupted();
   }
 }

@@ -14,11 +14,20 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-/// A watch of the library, and what ends when its client is closed.
+/// A watch of the library, and the client that it ends with.
 template <class Watch>
 struct Watching {
   Watch watch;
   std::shared_ptr<Endings> endings;
+  std::weak_ptr<const Session> session;
+
+  /// @throws TransformException once nothing new comes
+  void check_open() const {
+    check_usable();
+    const auto client = session.lock();
+    if (!client || client->closed())
+      raise({Errc::kTransport, "the client of this watch is closed"});
+  }
 };
 using Path = Watching<PathWatch>;
 using WatchedEdges = Watching<EdgesWatch>;
@@ -34,6 +43,7 @@ bool wait_for_more(const Watching<Watch>& self, std::uint64_t messages, py::hand
     const Steady::time_point slice = std::min(end, Steady::now() + kLook);
     if (without_gil([&] { return self.watch.wait_for_more(messages, slice); })) return true;
     check_interrupted();
+    self.check_open();
     if (!forever && Steady::now() >= end) return false;
   }
 }
@@ -49,13 +59,22 @@ template <class Watch>
 void bind_common(py::class_<Watching<Watch>>& cls) {
   using Self = Watching<Watch>;
   cls.def(
-      "check", [](const Self& self) { check(self.watch.health()); },
+      "check",
+      [](const Self& self) {
+        check_usable();
+        check(self.watch.health());
+      },
       "Raises UnreachableException if an owner is not reachable: the last values are used then.");
   cls.def_property_readonly(
-      "messages", [](const Self& self) { return self.watch.messages(); },
+      "messages",
+      [](const Self& self) {
+        check_usable();
+        return self.watch.messages();
+      },
       "The number of received messages with new data.");
   cls.def("wait_for_more", &wait_for_more<Watch>, py::arg("messages"), py::arg("timeout") = 1.0,
-          "Waits until `messages` exceeds this number; False after timeout [s].");
+          "Waits until `messages` exceeds this number; False after timeout [s]. Raises\n"
+          "TransformException once the client is closed.");
   cls.def("_listen", &listen<Watch>, py::arg("mailbox"));
 }
 
@@ -70,12 +89,13 @@ StampedTransform wait_next(Path& self, py::handle timeout) {
     auto next = without_gil([&] { return self.watch.wait_next(slice); });
     if (next) return *std::move(next);
     check_interrupted();
-    if (!forever && left <= slice) raise(next.error());
+    self.check_open();
+    if (!forever && left <= slice) raise(of_whole_wait(next.error(), slice, wait));
   }
 }
 
 std::unique_ptr<Listening> on_value(const Path& self, py::function callback) {
-  check_usable();
+  self.check_open();
   const SharedFunction function = share(std::move(callback));
   return without_gil([&] {
     return std::make_unique<Listening>(
@@ -92,14 +112,15 @@ WatchOptions options_of(double rate, bool composed, py::handle span) {
   WatchOptions options;
   options.rate = rate;
   options.composed = composed;
-  if (!span.is_none()) options.timing.span = to_duration(span, "span");
+  if (!span.is_none()) options.timing.span = not_negative(to_duration(span, "span"), "span");
   return options;
 }
 
 template <class Watch>
-std::unique_ptr<Watching<Watch>> made(const Session& session, Result<Watch>&& watch) {
+std::unique_ptr<Watching<Watch>> made(const std::shared_ptr<Session>& session,
+                                      Result<Watch>&& watch) {
   return std::make_unique<Watching<Watch>>(
-      Watching<Watch>{value_of(std::move(watch)), session.endings()});
+      Watching<Watch>{value_of(std::move(watch)), session->endings(), session});
 }
 
 void bind_path(py::module_& module, ClientClass& client) {
@@ -109,12 +130,17 @@ void bind_path(py::module_& module, ClientClass& client) {
       "memory. It is watched while this object exists.\n\n"
       "`async for X in watch` gets the newest transform whenever there is a new one.");
   cls.def(
-      "latest", [](const Path& self) { return value_of(self.watch.latest()); },
+      "latest",
+      [](const Path& self) {
+        check_usable();
+        return value_of(self.watch.latest());
+      },
       "X_AB at the newest instant that all dynamic edges of the path have received.");
   cls.def(
       "lookup",
       [](const Path& self, py::handle at, py::handle extrapolate, py::handle age_noise_until,
          int order) {
+        check_usable();
         return value_of(self.watch.lookup(to_query(at, extrapolate, age_noise_until, order)));
       },
       py::arg("at") = py::none(), py::kw_only(), py::arg("extrapolate") = 0.0,
@@ -122,21 +148,23 @@ void bind_path(py::module_& module, ClientClass& client) {
       "As Client.lookup(), from the received values.");
   cls.def("wait_next", &wait_next, py::arg("timeout") = 1.0,
           "Waits for a value that this object has not returned yet: the first time for the newest\n"
-          "one. Values between two calls are not kept. Raises TimeoutException after timeout [s].");
+          "one. Values between two calls are not kept. Raises TimeoutException after timeout [s],\n"
+          "TransformException once the client is closed.");
   cls.def(
       "on_value", &on_value, py::arg("callback"),
       "Calls a function with the newest transform, and then when there is another one, from a\n"
       "thread of the library, one call at a time; or with an exception, when there is none any\n"
-      "more. Returns a Subscription, which must be kept.");
+      "more. Returns a Subscription, which must be kept. Ends with it, this object or the client;\n"
+      "of a closed client it raises TransformException.");
   bind_common(cls);
   client.def(
       "watch",
-      [](const Session& session, const std::string& a, const std::string& b, double rate,
-         bool composed, py::handle span, py::handle timeout) {
+      [](const std::shared_ptr<Session>& session, const std::string& a, const std::string& b,
+         double rate, bool composed, py::handle span, py::handle timeout) {
         const WatchOptions options = options_of(rate, composed, span);
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
-        if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(session, a, b, {}, wait));
-        return made(session, session.call([&](Client& c) { return c.watch(a, b, options); }));
+        if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(*session, a, b, {}, wait));
+        return made(session, session->call([&](Client& c) { return c.watch(a, b, options); }));
       },
       py::arg("a"), py::arg("b"), py::kw_only(), py::arg("rate") = 0.0, py::arg("composed") = false,
       py::arg("span") = py::none(), py::arg("timeout") = 0.0,
@@ -153,6 +181,7 @@ void bind_edges(py::module_& module, ClientClass& client) {
       "lookup",
       [](const WatchedEdges& self, const std::string& a, const std::string& b, py::handle at,
          py::handle extrapolate, py::handle age_noise_until, int order) {
+        check_usable();
         return value_of(self.watch.lookup(a, b, to_query(at, extrapolate, age_noise_until, order)));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
@@ -161,11 +190,11 @@ void bind_edges(py::module_& module, ClientClass& client) {
   bind_common(cls);
   client.def(
       "watch_edges",
-      [](const Session& session, const std::vector<std::string>& ids, double rate, py::handle span,
-         py::handle timeout) {
+      [](const std::shared_ptr<Session>& session, const std::vector<std::string>& ids, double rate,
+         py::handle span, py::handle timeout) {
         const WatchOptions options = options_of(rate, false, span);
         return made(session, Result<EdgesWatch>(
-                                 after_wait(session, timeout, [&](Client& c, Milliseconds wait) {
+                                 after_wait(*session, timeout, [&](Client& c, Milliseconds wait) {
                                    return c.watch_edges(ids, options, wait);
                                  })));
       },

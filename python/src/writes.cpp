@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <optional>
 
 #include <pybind11/stl.h>
@@ -159,7 +160,7 @@ void bind_many(ClientClass& cls) {
           const std::optional<Time> time = to_stamp(stamp, "stamp");
           return check(session.call([&](Client& c) { return c.publish(edges, time); }));
         }
-        const std::vector<Time> stamps = to_instants(stamp);
+        const std::vector<Time> stamps = to_instants(stamp, "stamp");
         check(session.call([&](Client& c) { return tfdude::publish(c, edges, stamps); }));
       },
       py::arg("ids"), py::arg("poses"), py::arg("covariances") = py::none(),
@@ -170,7 +171,11 @@ void bind_many(ClientClass& cls) {
 
 /// The interval of a rewrite: (first, last), or that of the samples.
 TimeInterval interval_of(py::handle interval, const std::vector<Time>& stamps) {
-  if (interval.is_none()) return {stamps.front(), stamps.back()};
+  if (interval.is_none()) {
+    // Also of those that are not in order, so that the error says that.
+    const auto [first, last] = std::minmax_element(stamps.begin(), stamps.end());
+    return {*first, *last};
+  }
   const bool pair = py::isinstance<py::sequence>(interval) && py::len(interval) == 2;
   if (!pair) throw py::type_error("interval must be None, or its first and last instant");
   const auto ends = py::reinterpret_borrow<py::sequence>(interval);
@@ -182,7 +187,7 @@ void bind_rewrite(ClientClass& cls) {
       "rewrite",
       [](const Session& session, const std::string& id, py::handle stamps, py::handle poses,
          py::handle covariances, py::handle interval) {
-        const std::vector<Time> times = to_instants(stamps);
+        const std::vector<Time> times = to_instants(stamps, "stamps");
         if (times.empty()) throw py::value_error("stamps must have at least one instant");
         const std::vector<Transform> X = to_transforms(poses, covariances, times.size());
         std::vector<EdgeSample> samples(times.size());

@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 import tfdude
-from tfdude import Transform
+from tfdude import Transform, aio
 
 START = 1_000_000_000_000_000_000
 
@@ -116,3 +116,45 @@ def test_watch(client, node):
         assert [X.stamp - START async for X in watch] == [3000]
 
     asyncio.run(asyncio.wait_for(main(), 20))
+
+
+def test_two_loops_over_the_same(client, node):
+    async def main():
+        events = client.events()
+        messages = tfdude.MessageFilter(client, "base", max_age=20)
+        seen = []
+
+        async def of_events(name):
+            async for change in events:
+                seen.append(change.frame)
+
+        async def of_messages(name):
+            async for message, _ in messages:
+                seen.append(message)
+
+        tasks = [asyncio.create_task(loop(i)) for loop in (of_events, of_messages) for i in range(2)]
+        await asyncio.sleep(0.01)
+        node.add("late", "tool", Transform((1, 0, 0)))
+        for i in range(4):
+            messages.push(i, "late", START)
+        while len(seen) < 5:
+            await asyncio.sleep(0.001)
+        assert sorted(map(str, seen)) == ["0", "1", "2", "3", "late"]
+        events.close()
+        messages.close()
+        await asyncio.wait_for(asyncio.gather(*tasks), 20)
+
+    asyncio.run(main())
+
+
+def test_calls_that_wait_hold_up_no_other(client):
+    async def main():
+        async with aio.Client(client) as shared:
+            waiting = [asyncio.create_task(shared.can_lookup("base", "nowhere", timeout=20)) for _ in range(40)]
+            await asyncio.sleep(0.01)
+            assert await asyncio.wait_for(shared.exists("base"), 10)
+            assert not any(task.done() for task in waiting)
+            client.close()  # ends them
+            await asyncio.gather(*waiting)
+
+    asyncio.run(main())

@@ -1,5 +1,6 @@
 """Errors say what they are about as data, calls wait for what comes, and wrong arguments name themselves."""
 
+import datetime
 import threading
 import time
 
@@ -10,6 +11,7 @@ from helpers import eventually
 from tfdude import FrameSpec, Joint, Transform
 
 START = 1_000_000_000_000_000_000
+NETWORK = tfdude.LoopbackNetwork()
 
 
 def test_errors_of_lookups_are_data(client, node):
@@ -49,11 +51,127 @@ def test_errors_of_other_calls_name_what_their_text_names(client, node):
         (TypeError, "positions", lambda c: c.update_joints(["a"], ["x"])),
         (ValueError, "order must be 2 or 4, not 3", lambda c: c.lookup("base", "tool", order=3)),
         (ValueError, "at", lambda c: c.lookup("base", "tool", float("nan"))),
+        (TypeError, "at", lambda c: c.lookup("base", "tool", np.array([START, START]))),
+        (ValueError, "extrapolate must not be negative", lambda c: c.lookup("base", "tool", extrapolate=-1)),
+        (ValueError, "span must not be negative", lambda c: c.watch("base", "tool", span=-1)),
+        (ValueError, "timeout must not be negative", lambda c: tfdude.Client(timeout=-1, network=NETWORK)),
+        (ValueError, "max_age must not be negative", lambda c: tfdude.MessageFilter(c, "base", max_age=-1)),
     ],
 )
 def test_wrong_arguments_name_themselves(client, kind, name, call):
     with pytest.raises(kind, match=rf"^{name}\b"):
         call(client)
+
+
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("instants", lambda c, stamps: c.trajectory("base", "tool", stamps)),
+        ("at", lambda c, stamps: c.lookup_many([("base", "tool")], stamps)),
+        ("stamps", lambda c, stamps: c.transform_cloud("base", "tool", np.zeros((2, 3)), stamps=stamps)),
+        ("stamps", lambda c, stamps: c.rewrite("tool", stamps, np.zeros((2, 7)))),
+        ("stamp", lambda c, stamps: c.publish(["tool"], [Transform.exact()], stamp=stamps)),
+    ],
+)
+def test_instants_of_another_shape(client, name, call):
+    with pytest.raises(ValueError, match=rf"^{name} must have the shape \(N,\), not \(2, 3\)"):
+        call(client, np.full((2, 3), START))
+
+
+UTC = datetime.timezone.utc
+
+
+@pytest.mark.parametrize("at", [datetime.datetime(2611, 6, 18, tzinfo=UTC), datetime.datetime(9999, 1, 1, tzinfo=UTC),
+                                datetime.datetime(1, 1, 1, tzinfo=UTC), 2**63, -(2**63) - 1, 1e10])
+def test_instants_beyond_the_range(client, node, at):
+    for call in (lambda: client.lookup("base", "tool", at), lambda: node.update("tool", Transform.exact(), at),
+                 lambda: client.trajectory("base", "tool", [at])):
+        with pytest.raises(ValueError, match="^(at|stamp|an instant) is out of range: "):
+            call()
+
+
+def test_instants_of_uint64(client, node):
+    for i in range(2):
+        node.update("tool", Transform.exact((i, 0, 0)), START + i * 1000)
+    assert client.trajectory("base", "tool", np.array([START, START + 500], np.uint64)).valid.all()
+    with pytest.raises(ValueError, match="^instant 1 is out of range"):
+        client.trajectory("base", "tool", np.array([START, 2**63], np.uint64))
+
+
+@pytest.mark.parametrize("timeout", [datetime.timedelta.max, datetime.timedelta(days=146000), 10**10, 2**70, 10**400])
+def test_durations_beyond_the_range(client, timeout):
+    with pytest.raises(ValueError, match="^timeout is out of range: "):
+        client.lookup("base", "nowhere", timeout=timeout)
+
+
+def test_the_longest_durations(client):
+    assert client.lookup("base", "tool", timeout=datetime.timedelta(days=106000)).translation.shape == (3,)
+
+
+def test_samples_not_in_order(client, node):
+    for i in range(2):
+        node.update("tool", Transform.exact((i, 0, 0)), START + i * 1000)
+    with pytest.raises(tfdude.InvalidArgumentException, match="not later than the one before"):
+        client.rewrite("tool", [START + 1000, START], [Transform.exact()] * 2)
+
+
+def test_messages_name_the_time_of_the_whole_wait(client):
+    watch = client.watch("base", "tool", timeout=10)
+    watch.wait_next(10)
+    with pytest.raises(tfdude.TimeoutException, match=" within 120 ms"):
+        watch.wait_next(0.12)
+    with pytest.raises(tfdude.TimeoutException, match=" within 120 ms"):
+        client.wait_until(client.now() + 10**15, 0.12)
+
+
+def ends_with_the_client(client, wait):
+    """How a wait without a limit ends when the client is closed."""
+    ended = []
+
+    def run():
+        try:
+            ended.append(wait())
+        except tfdude.TransformException as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    closing = threading.Timer(0.1, client.close)
+    closing.start()
+    thread.join(20)
+    closing.join()
+    assert ended, "it still waits"
+    return ended[0]
+
+
+def test_waits_of_watches_end_with_the_client(network, node):
+    forever = float("inf")
+    for prepare in (
+        lambda path, edges: lambda: path.wait_next(forever),
+        lambda path, edges: lambda: path.wait_for_more(10**9, forever),
+        lambda path, edges: lambda: edges.wait_for_more(10**9, forever),
+    ):
+        client = tfdude.Client(network=network)
+        path = client.watch("base", "tool", timeout=10)
+        edges = client.watch_edges(["tool"], timeout=10)
+        path.wait_next(10)
+        error = ends_with_the_client(client, prepare(path, edges))
+        assert isinstance(error, tfdude.TransformException) and error.code == "transport", error
+        for call in (lambda: path.wait_next(forever), lambda: edges.wait_for_more(10**9, forever),
+                     lambda: path.on_value(print)):
+            with pytest.raises(tfdude.TransformException, match="closed"):
+                call()
+
+
+def test_durations_of_get(client, node):
+    short = datetime.timedelta(milliseconds=10)
+    assert tfdude.MessageFilter(client, "base").get(short) is None
+    with client.events() as events:
+        assert events.get(short) is None
+        node.add("late", "tool", Transform())
+        assert events.get(datetime.timedelta(seconds=10)).frame == "late"
+        with pytest.raises(TypeError, match="^timeout must be a number"):
+            events.get("long")
 
 
 @pytest.mark.parametrize(

@@ -115,11 +115,15 @@ def test_child_of_a_fork_gets_a_clear_error():
         import warnings
         # Python 3.12 and later warn of what is tested here.
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+        watch = client.watch("base", "tool", timeout=10)
+        edges = client.watch_edges(["tool"], timeout=10)
         child = os.fork()
         if child == 0:
             failures = 0
             for call in (lambda: client.lookup("base", "tool"), lambda: node.update("tool", Transform()),
-                         lambda: tfdude.Client(network=network), lambda: client.stream(["tool"])):
+                         lambda: tfdude.Client(network=network), lambda: client.stream(["tool"]),
+                         watch.latest, watch.lookup, lambda: watch.messages, watch.check,
+                         lambda: edges.lookup("base", "tool"), lambda: edges.messages):
                 try:
                     call()
                 except tfdude.TransformException as error:
@@ -133,7 +137,7 @@ def test_child_of_a_fork_gets_a_clear_error():
         assert status == 0, status
         client.lookup("base", "tool")  # the parent goes on
     """)
-    assert out == "4 failures"
+    assert out == "10 failures"
 
 
 def test_fork_before_use_works():

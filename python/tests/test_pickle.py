@@ -81,6 +81,18 @@ def test_what_calls_return(network, node, client):
         check(value)
     observed = client.observe("upper", "tool", Transform((2, 0, 0), stddev=[0.1] * 6))
     check(observed)
+    node.correlate("upper", {"heat": (0, 0, 1e-3, 0, 0, 0)})
+    nothing = client.why("base", "nowhere")
+    assert properties(pickle.loads(pickle.dumps(nothing))) == properties(nothing)
+    for value in [client.why("base", "lower"), nothing.cause, client.can_lookup("base", "nowhere")]:
+        check(value)
+    possible = pickle.loads(pickle.dumps([client.can_lookup("base", "tool"), client.can_lookup("base", "nowhere")]))
+    assert [bool(one) for one in possible] == [True, False]
+    Q = np.diag([1e-4, 2e-4, 3e-4])
+    for points in [client.transform("base", "lower", (0, 0, 1)), client.transform("base", "lower", np.eye(3), order=4),
+                   client.transform("base", "lower", np.eye(3), covariance=Q, direction=True),
+                   client.transform("base", "lower", np.zeros((0, 3)))]:
+        check(points)
 
 
 def test_descriptions_of_frames():

@@ -84,19 +84,38 @@ async def lookup_async(
     return await hub.lookup(self, a, b, at, timeout, extrapolate, age_noise_until, order)
 
 
+# Those who wait for a mailbox, by its descriptor: a loop has one reader for each.
+_readers: weakref.WeakKeyDictionary[asyncio.AbstractEventLoop, dict[int, list[asyncio.Future[None]]]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
 async def _until_readable(mailbox: _core._Mailbox) -> None:
     loop = asyncio.get_running_loop()
+    readers = _readers.setdefault(loop, {})
+    fd = mailbox.fileno()
     readable: asyncio.Future[None] = loop.create_future()
+    waiting = readers.setdefault(fd, [])
 
     def wake() -> None:
-        if not readable.done():
-            readable.set_result(None)
+        for one in waiting:
+            if not one.done():
+                one.set_result(None)
 
-    loop.add_reader(mailbox.fileno(), wake)
+    if not waiting:
+        loop.add_reader(fd, wake)
+    waiting.append(readable)
     try:
         await readable
     finally:
-        loop.remove_reader(mailbox.fileno())
+        waiting.remove(readable)
+        if not waiting:
+            loop.remove_reader(fd)
+            del readers[fd]
+
+
+def _deadline(timeout: _Duration | None) -> float:
+    return math.inf if timeout is None else time.monotonic() + _core._seconds(timeout, "timeout")
 
 
 class Events:
@@ -121,9 +140,9 @@ class Events:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def get(self, timeout: float | None = None) -> _core.Change | None:
+    def get(self, timeout: _Duration | None = None) -> _core.Change | None:
         """The next change; None after timeout [s] (None: without limit), or if nothing more comes."""
-        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        deadline = _deadline(timeout)
         while (change := self._next()) is None and not self._mailbox.ended:
             left = deadline - time.monotonic()
             if left < 0:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import collections
 import collections.abc
-import math
 import select
 import time
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from . import _core, _errors
-from ._aio import _until_readable
+from ._aio import _deadline, _until_readable
 
 if TYPE_CHECKING:
     from ._core import _Duration, _Instant
@@ -54,6 +53,8 @@ class MessageFilter(Generic[Message]):
         extrapolate: _Duration = 0.0,
         on_dropped: collections.abc.Callable[[Message, _errors.TransformException], object] | None = None,
     ) -> None:
+        if _core._seconds(max_age, "max_age") < 0:
+            raise ValueError("max_age must not be negative")
         self._client = client
         self._query: tuple[Any, ...] = (max_age, extrapolate, None, 2)
         self._target = target
@@ -98,9 +99,9 @@ class MessageFilter(Generic[Message]):
         self._closed = True
         self._mailbox.wake()
 
-    def get(self, timeout: float | None = None) -> tuple[Message, _core.StampedTransform] | None:
+    def get(self, timeout: _Duration | None = None) -> tuple[Message, _core.StampedTransform] | None:
         """The next message and its transform; None after timeout [s] (None: without limit), or if nothing comes."""
-        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        deadline = _deadline(timeout)
         while (found := self._next()) is None and not self._over():
             left = deadline - time.monotonic()
             if left < 0:

@@ -7,7 +7,8 @@
         async for X in await client.watch("map", "hand"):
             ...
 
-Lookups wait without a thread, thousands at once. Other calls run on threads of a pool, so asyncio's loop goes on.
+Lookups wait without a thread, thousands at once, and end with their task. Each other call has a thread meanwhile, up to
+256 at once, and goes on until its end or timeout when its task is cancelled.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+# Of the other calls at once. Threads are made when they are needed, so that a call that waits holds up no other.
+_MOST_THREADS = 256
+
 # What is answered from this process's memory, or returns at once, needs no thread.
 _AT_ONCE = frozenset({"close", "closed", "events", "on_change", "partition", "own_frames"})
 
@@ -39,7 +43,7 @@ class Client:
     def __init__(self, client: _core.Client | None = None, **options: Any) -> None:
         self._owns = client is None
         self._client = _core.Client(**options) if client is None else client
-        self._pool = concurrent.futures.ThreadPoolExecutor(thread_name_prefix="tfdude-aio")
+        self._pool = concurrent.futures.ThreadPoolExecutor(_MOST_THREADS, thread_name_prefix="tfdude-aio")
 
     @property
     def sync(self) -> _core.Client:

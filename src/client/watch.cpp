@@ -33,7 +33,8 @@ Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
       returned_ = *newest;
       return newest;
     }
-    if (!newest && more) return newest;
+    // Once the client has ended there is nothing to wait for.
+    if (!newest && (more || newest.error().code == Errc::kTransport)) return newest;
     if (path_->wait_for_more(messages, deadline.at())) continue;
     if (!newest) return newest;
     return fail(Errc::kTimeout,

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -110,6 +112,20 @@ TEST_CASE("waiting: each call that reads waits for frames and data") {
   REQUIRE_FALSE(never);
   CHECK(never.error().code == Errc::kNotYet);
   CHECK(client.watch("world", "nowhere", {}, 20ms).error().code == Errc::kUnknownEnd);
+}
+
+TEST_CASE("waiting: wait_next() of a client that has ended does not wait") {
+  World world;
+  auto ended = std::make_unique<Client>(Client::open(world.join("")).value());
+  auto watch = ended->watch("world", "base", {}, 20s);
+  REQUIRE(watch);
+  ended.reset();
+  const auto begin = std::chrono::steady_clock::now();
+  // Also the first time, when it would wait for a value.
+  const auto never = watch->wait_next(20s);
+  REQUIRE_FALSE(never);
+  CHECK(never.error().code == Errc::kTransport);
+  CHECK(std::chrono::steady_clock::now() - begin < 10s);
 }
 
 TEST_CASE("waiting: wait_next() returns each new value once, and the newest of several") {

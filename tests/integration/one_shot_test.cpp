@@ -324,6 +324,13 @@ TEST_CASE("one-shot: covariance that is not given is said, and joints that were 
   const std::vector<std::string> question{"lookup", "base", "tool"};
   CHECK_FALSE(quick.answers(question));
   CHECK_THAT(domain.cli(question).out, ContainsSubstring("lift"));
+  // An empty instant is not the newest.
+  CHECK_FALSE(quick.answers({"lookup", "hand", "tool", "--at", ""}));
+  for (const char* option : {"--at", "--fixed"}) {
+    const auto empty = domain.cli({"lookup", "hand", "tool", option, ""});
+    CHECK(empty.status == 2);
+    CHECK_THAT(empty.err, ContainsSubstring(option));
+  }
   REQUIRE(domain.cli({"joint", "lift=0.5"}).status == 0);
   CHECK(eventually([&] { return quick.answers(question); }));
 }

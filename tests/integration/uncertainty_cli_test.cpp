@@ -76,7 +76,12 @@ TEST_CASE("uncertainty: lookups over owners use configured sources and unknown c
              ContainsSubstring("order        fourth\n"));
   const json fourth = robot.answered({"lookup", "world", "arm", "--order", "4"});
   CHECK(fourth.at("basis").at("order") == 4);
-  CHECK(robot.run({"lookup", "world", "arm", "--order", "3"}).status == 2);
+  for (const char* order : {"3", "2.0"}) {
+    const auto rejected = robot.run({"lookup", "world", "arm", "--order", order});
+    CHECK(rejected.status == 2);
+    CHECK_THAT(rejected.err,
+               ContainsSubstring("--order: '" + std::string(order) + "' is neither 2 nor 4"));
+  }
 }
 
 TEST_CASE("uncertainty: a measurement corrects or is rejected by the gate and is counted") {

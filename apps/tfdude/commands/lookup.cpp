@@ -19,6 +19,9 @@ struct Lookup final : Question {
     add_instant(app, at);
     auto* option = app.add_option(
         "--fixed", fixed, "frame that does not move between --at (for A) and --at-b (for B)");
+    option->check([](const std::string& text) {
+      return std::string(text.empty() ? "an empty text is no id of a frame" : "");
+    });
     add_stamp(app, "--at-b", at_b, "the instant for B; --at is for A")->needs(option);
     add_milliseconds(app, "--extrapolate", extrapolate_ms,
                      "how far to extrapolate beyond an edge's newest sample");
