@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/client/frame_source.hpp"
 #include "tfdude/recording/recording.hpp"
+#include "tfdude/tf2.hpp"
 
 #include "base/cdr.hpp"
 #include "recording/mcap_writer.hpp"
@@ -163,6 +165,29 @@ TEST_CASE("recording of ROS: stamps of another clock are looked up at the end") 
     CHECK(path.X_AB[1].value().pose.translation().x() == 1);
     REQUIRE(path.missing.size() == 2);
   }
+}
+
+TEST_CASE("recording of ROS: a buffer over it needs no timeouts") {
+  std::vector<Sent> all;
+  for (int i = 0; i < 40; ++i) all.push_back(sample(i, i + 10));
+  auto recording = Recording::read(file_of(all, "/tf"));
+  REQUIRE(recording);
+  RecordingSource source(*recording);
+  const tf2_ros::Buffer buffer(source);
+  using std::chrono::milliseconds;
+  const auto x = [&](int ms) {
+    return buffer.lookupTransform("odom", "base", milliseconds(ms)).transform.translation.x;
+  };
+  CHECK(x(20'500) == 10.5);
+  CHECK(x(12'250) == 2.25);
+  // A timeout counts in the time of the recording.
+  CHECK_FALSE(buffer.canTransform("odom", "base", milliseconds(20'500), milliseconds(100)));
+  CHECK(buffer._frameExists("/odom"));
+  CHECK_FALSE(buffer._frameExists("moon"));
+  CHECK(buffer.getAllFrameNames().size() == 2);
+  CHECK(buffer.lookupTransform("base", milliseconds(12'500), "base", milliseconds(15'000), "odom")
+            .transform.translation.x == 2.5);
+  CHECK_THROWS_AS(x(90'000), tf2::ExtrapolationException);
 }
 
 TEST_CASE("recording of ROS: 0 at the start of simulated time is that time") {
