@@ -47,7 +47,7 @@ int Question::ask_recording(Recording& recorded, const Common& common) const {
   const auto believed = optional_stamp(source, believed_at);
   if (!instant) return report(instant.error(), common);
   if (!believed) return report(believed.error(), common);
-  if (*instant) recorded.seek(**instant);
+  if (*instant) source.go_to(**instant);
   if (*believed) source.believe_as_of(**believed);
   return ask_source(source, common);
 }

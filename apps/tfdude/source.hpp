@@ -17,7 +17,14 @@ class Source {
   // NOLINTNEXTLINE(google-explicit-constructor): a client is one
   Source(Client& client) : client_(&client) {}
   /// The end of the recording is now, for stamps that count back from it.
-  explicit Source(Recording& recording) : recording_(&recording), end_(recording.instant()) {}
+  explicit Source(Recording& recording)
+      : recording_(&recording), end_(recording.instant()), from_(end_) {}
+
+  /// From now on answers a recording as of a stamp.
+  void go_to(Time stamp) {
+    from_ = recording_->instant_for(stamp);
+    recording_->seek(from_);
+  }
 
   /// From now on answers with what was known at an instant of the recording, also of others.
   void believe_as_of(Time instant) {
@@ -59,9 +66,8 @@ class Source {
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition) const {
     return live() ? client_->histories(partition) : recording_->histories(partition);
   }
-  /// A recording that does not show an instant after that of the query is read on until it has the
-  /// data, as Recording::lookup_at() does. An instant before its beginning, as of stamps of another
-  /// clock, is looked up at its end.
+  /// A recording is read on until it has the data, as Recording::lookup_at() does, but not for an
+  /// instant before the one that was gone to: of that it has what was known there.
   /// @param wait  how much of a recording is read on
   [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
                                                 const Query& query, Milliseconds wait) const;
@@ -78,6 +84,7 @@ class Source {
   Client* client_ = nullptr;
   Recording* recording_ = nullptr;
   Time end_{};
+  Time from_{};  // the instant that was gone to
   bool reads_on_ = true;
 };
 

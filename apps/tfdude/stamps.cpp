@@ -16,7 +16,7 @@ Result<std::optional<Time>> optional_stamp(Source source, const std::string& tex
 Result<Time> beginning(Recording& recording, const std::string& at) {
   const Time start = recording.summary().start.value_or(Time{});
   return optional_stamp(Source(recording), at).map([&](const std::optional<Time>& stamp) {
-    return stamp.value_or(start);
+    return std::max(stamp.value_or(start), start);
   });
 }
 

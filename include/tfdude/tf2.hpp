@@ -68,7 +68,7 @@ class Buffer {
     const std::string b = name(source);
     const std::string c = name(fixed);
     if (a.empty() || b.empty() || c.empty()) tf2::detail::raise(no_frame());
-    auto X = client().lookup(a, at_target, b, at_source, c, wait);
+    auto X = source_->lookup_over(a, at_target, b, at_source, c, wait);
     if (!X) tf2::detail::raise(X.error());
     if (at_target.at) X->stamp = at_target.at;
     return message(target, source, *X, Time());
@@ -120,14 +120,16 @@ class Buffer {
   }
 
   [[nodiscard]] std::vector<std::string> getAllFrameNames() const {
-    const auto frames = client().frames();
+    const auto frames = source_->frames();
     if (!frames) tf2::detail::raise(frames.error());
     std::vector<std::string> names;
     for (const Frame& frame : *frames) names.push_back(frame.id);
     return names;
   }
   [[nodiscard]] bool _frameExists(const std::string& frame) const {
-    return client().exists(name(frame));
+    if (client_ != nullptr) return client_->exists(name(frame));
+    const auto names = getAllFrameNames();
+    return std::find(names.begin(), names.end(), name(frame)) != names.end();
   }
 
   // What a node tells tf2 about its executor: there is nothing to spin.
@@ -150,11 +152,6 @@ class Buffer {
   }
   [[nodiscard]] static Milliseconds milliseconds(tf2::Duration timeout) {
     return std::chrono::ceil<Milliseconds>(std::max(timeout, tf2::Duration()));
-  }
-
-  [[nodiscard]] Client& client() const {
-    if (client_ != nullptr) return *client_;
-    throw tf2::TransformException("this source only answers lookups at one time");
   }
 
   [[nodiscard]] Result<StampedTransform> look_up(const std::string& target,

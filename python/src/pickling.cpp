@@ -96,7 +96,7 @@ TFDUDE_MEMBERS(VarianceShare, &VarianceShare::name, &VarianceShare::variance,
 TFDUDE_MEMBERS(PossibleMeasurement, &PossibleMeasurement::a, &PossibleMeasurement::b,
                &PossibleMeasurement::variance_after);
 TFDUDE_MEMBERS(OwnerAge, &OwnerAge::partition, &OwnerAge::reachable, &OwnerAge::slowest,
-               &OwnerAge::newest, &OwnerAge::age);
+               &OwnerAge::newest, &OwnerAge::age, &OwnerAge::clock_ahead);
 TFDUDE_MEMBERS(Explanation, &Explanation::X_AB, &Explanation::cause, &Explanation::direction,
                &Explanation::is_rotation, &Explanation::variance, &Explanation::edges,
                &Explanation::sources, &Explanation::joints, &Explanation::best,

@@ -36,7 +36,6 @@ Result<Cursor> Cursor::open(std::unique_ptr<ByteSource> source) {
   cursor.foreign_ = std::none_of(metadata.begin(), metadata.end(),
                                  [](const Metadata& one) { return one.name == "tfdude"; });
   cursor.find_topics();
-  // The channels of a file without a summary may be in its chunks.
   if (cursor.foreign_ && !cursor.peek()) {
     const std::size_t known = cursor.reader_.problems().size();
     if (cursor.problems_.size() > known) {
@@ -138,8 +137,12 @@ void Cursor::note(std::string problem) {
 }
 
 // @return the bytes of its messages
-std::size_t Cursor::load(const ChunkPlace& chunk) {
+std::size_t Cursor::load(std::size_t number) {
   std::size_t bytes = 0;
+  // The channels of a file without a summary may be in its chunks.
+  if (auto ok = reader_.learn_channels(number); !ok) note(ok.error().message);
+  find_topics();
+  const ChunkPlace& chunk = reader_.chunks()[number];
   const bool statics_only = statics_before_ && checked_time(chunk.end) < *statics_before_;
   if (!is_wanted(chunk, statics_only)) return bytes;
   auto read = reader_.read(chunk, [&](const Message& message) {
@@ -162,7 +165,7 @@ std::size_t Cursor::load(const ChunkPlace& chunk) {
 void Cursor::load_ahead() {
   constexpr std::size_t kLeast = std::size_t{1} << 20U;
   for (std::size_t bytes = 0; bytes < kLeast && chunk_ < reader_.chunks().size();) {
-    bytes += load(reader_.chunks()[chunk_++]);
+    bytes += load(chunk_++);
   }
 }
 
@@ -288,7 +291,7 @@ bool Cursor::fetch() {
     ahead_.get();
   } else if (loaded_.empty()) {
     if (chunk_ == reader_.chunks().size()) return false;
-    (void)load(reader_.chunks()[chunk_++]);
+    (void)load(chunk_++);
   }
   waiting_.clear();
   std::swap(waiting_, loaded_);

@@ -95,7 +95,7 @@ class Cursor {
   [[nodiscard]] bool fetch();
   void begin_to_read_ahead();
   void end_reading_ahead();
-  std::size_t load(const ChunkPlace& chunk);
+  std::size_t load(std::size_t chunk);
   void load_ahead();
   void add(const Message& message, bool statics_only);
   [[nodiscard]] Result<void> decode(Topic topic, const Message& message);

@@ -129,13 +129,15 @@ Result<void> McapReader::scan() {
     if (!record) return tl::unexpected(record.error());
     if (!*record || static_cast<std::uint8_t>((*record)->op) == 0) {
       problems_.push_back("the record " + at_byte(offset) + " is damaged, or the last one is cut");
-      return {};
+      break;
     }
     const auto more = scan_record(**record);
     if (!more) return tl::unexpected(more.error());
     if (!*more) return {};
     offset += kRecordHead + (*record)->length;
   }
+  // Of the last index, records may be missing.
+  if (!chunks_.empty()) chunks_.back().channels.clear();
   return {};
 }
 
@@ -173,7 +175,9 @@ Result<void> McapReader::add_scanned_chunk(const Record& record) {
   const auto bytes = window_->at(record.offset + kRecordHead, kChunkTimes);
   if (!bytes) return tl::unexpected(bytes.error());
   ByteReader reader(*bytes);
-  ChunkPlace chunk{record.offset, kRecordHead + record.length, 0, 0, {}, false};
+  ChunkPlace chunk;
+  chunk.offset = record.offset;
+  chunk.length = kRecordHead + record.length;
   chunk.start = reader.number<std::int64_t>();
   chunk.end = reader.number<std::int64_t>();
   return add_chunk(std::move(chunk));
@@ -196,7 +200,7 @@ Result<void> McapReader::add_loose_message(const Record& record) {
       return {};
     }
   }
-  return add_chunk({record.offset, length, time, time, {}, true});
+  return add_chunk({record.offset, length, time, time, {}, true, true});
 }
 
 }  // namespace tfdude::recording

@@ -1,6 +1,8 @@
 #include "recording/mcap_reader.hpp"
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
@@ -110,31 +112,70 @@ Result<void> McapReader::count_names(std::uint64_t bytes) {
                                   std::to_string(kMaxNamesBytes) + " bytes");
 }
 
+// What is known already counts once, however often its chunk is read.
 Result<void> McapReader::read_names(Op op, std::string_view bytes) {
-  if (auto ok = count_names(bytes.size()); !ok) return ok;
   ByteReader reader(bytes);
   if (op == Op::kSchema) {
     Schema schema;
     schema.id = reader.u16();
+    if (schemas_.count(schema.id) == 1) return {};
     schema.name = reader.text();
     schema.encoding = reader.text();
     schema.data = reader.text();
-    if (reader.good()) schemas_.emplace(schema.id, std::move(schema));
-  } else if (op == Op::kChannel) {
+    if (!reader.good()) return {};
+    return count_names(bytes.size()).map([&] { schemas_.emplace(schema.id, std::move(schema)); });
+  }
+  if (op == Op::kChannel) {
     Channel channel;
     channel.id = reader.u16();
+    if (channels_.count(channel.id) == 1) return {};
     channel.schema = reader.u16();
     channel.topic = reader.text();
     channel.encoding = reader.text();
     channel.metadata = map_of(reader.text());
-    if (reader.good()) channels_.emplace(channel.id, std::move(channel));
-  } else {
-    Metadata metadata;
-    metadata.name = reader.text();
-    metadata.values = map_of(reader.text());
-    if (reader.good()) metadata_.push_back(std::move(metadata));
+    if (!reader.good()) return {};
+    return count_names(bytes.size()).map([&] {
+      channels_.emplace(channel.id, std::move(channel));
+    });
   }
-  return {};
+  Metadata metadata;
+  metadata.name = reader.text();
+  metadata.values = map_of(reader.text());
+  if (!reader.good()) return {};
+  return count_names(bytes.size()).map([&] { metadata_.push_back(std::move(metadata)); });
+}
+
+bool McapReader::knows_channels(const ChunkPlace& chunk) const {
+  return std::all_of(chunk.channels.begin(), chunk.channels.end(),
+                     [this](std::uint16_t channel) { return channels_.count(channel) == 1; });
+}
+
+Result<void> McapReader::learn_channels(std::size_t chunk) {
+  Result<void> all;
+  const ChunkPlace& wanted = chunks_[chunk];
+  const auto is_known = [&] { return wanted.names_read || !wanted.channels.empty(); };
+  if (is_known() && knows_channels(wanted)) return all;
+  // Backwards: a channel may have begun in a chunk that was left out, long before it is used.
+  for (std::size_t i = chunk + 1; i-- > names_read_;) {
+    if (chunks_[i].names_read) continue;
+    if (auto ok = read_names(chunks_[i]); !ok) all = std::move(ok);
+    if (knows_channels(wanted)) return all;
+  }
+  names_read_ = std::max(names_read_, chunk + 1);
+  return all;
+}
+
+Result<void> McapReader::read_names(ChunkPlace& chunk) {
+  chunk.names_read = true;
+  std::set<std::uint16_t> channels;
+  auto ok = read(chunk, [&](const Message& message) {
+    channels.insert(message.channel);
+    return true;
+  });
+  if (!chunk.channels.empty()) return ok;
+  chunk.channels.assign(channels.begin(), channels.end());
+  const auto counted = count_names(channels.size() * sizeof(std::uint16_t));
+  return ok ? counted : ok;
 }
 
 Result<void> McapReader::add_chunk(ChunkPlace chunk) {

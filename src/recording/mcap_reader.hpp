@@ -21,8 +21,9 @@ struct ChunkPlace {
   std::uint64_t length = 0;
   std::int64_t start = 0;  ///< of the log times [ns]
   std::int64_t end = 0;
-  std::vector<std::uint16_t> channels;  ///< of its messages; empty: not known
-  bool loose = false;                   ///< messages that are not in a chunk
+  std::vector<std::uint16_t> channels{};  ///< of its messages; empty: not known
+  bool loose = false;                     ///< messages that are not in a chunk
+  bool names_read = false;                ///< by learn_channels()
 };
 
 /// Reads an MCAP file of any origin. What can be read of a damaged one is read, and problems() says
@@ -43,7 +44,7 @@ class McapReader {
 
   /// Sorted by their place in the file.
   [[nodiscard]] const std::vector<ChunkPlace>& chunks() const { return chunks_; }
-  /// In a file without a summary, those of a chunk are known once it was read.
+  /// In a file without a summary, those of a chunk are known after learn_channels().
   [[nodiscard]] const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
   /// Null: unknown.
   [[nodiscard]] const Schema* schema(std::uint16_t id) const;
@@ -57,6 +58,11 @@ class McapReader {
   [[nodiscard]] std::optional<std::uint64_t> message_count() const { return message_count_; }
   /// Sentences for people.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+
+  /// Makes known which channels the messages of a chunk have, and these channels, if it or a chunk
+  /// before it tells them: mostly the one with the first message. Reads no chunk twice for it.
+  /// @return as read(), of a chunk that was read for it
+  [[nodiscard]] Result<void> learn_channels(std::size_t chunk);
 
   /// Calls a function for each message of a chunk, in order; it returns whether to go on.
   /// @return kConfig: the chunk is damaged (nothing of it was visited) or ends early; kUnsupported:
@@ -84,6 +90,8 @@ class McapReader {
   void drop_overlapping();
   [[nodiscard]] Result<std::optional<Record>> record_at(std::uint64_t offset, std::uint64_t end);
   [[nodiscard]] Result<std::string_view> body(const Record& record);
+  [[nodiscard]] Result<void> read_names(ChunkPlace& chunk);
+  [[nodiscard]] bool knows_channels(const ChunkPlace& chunk) const;
   [[nodiscard]] Result<void> count_names(std::uint64_t bytes);
   [[nodiscard]] Result<void> read_names(Op op, std::string_view body);
   [[nodiscard]] Result<void> visit_records(std::string_view records, const Visit& visit);
@@ -98,6 +106,7 @@ class McapReader {
   std::map<std::uint16_t, Channel> channels_;
   std::vector<Metadata> metadata_;
   std::uint64_t names_bytes_ = 0;
+  std::size_t names_read_ = 0;  // chunks whose names are read, from the first one on
   bool finished_ = false;
   std::optional<std::uint64_t> message_count_;
   std::vector<std::string> problems_;

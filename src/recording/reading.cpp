@@ -88,7 +88,7 @@ Result<StampedTransform> Reading::lookup(std::string_view a, std::string_view b,
 Result<StampedTransform> Reading::lookup_at(std::string_view a, std::string_view b, Query query,
                                             Time at, Milliseconds wait) {
   query.at = at;
-  seek(at);
+  seek(instant_for(at));
   Losses losses;
   while (true) {
     auto X_AB = lookup(a, b, query);

@@ -18,8 +18,11 @@ namespace tfdude::recording {
 /// @par Thread safety  One thread at a time.
 class Reading {
  public:
-  /// Shows the instant.
-  Reading(Cursor cursor, Time at) : cursor_(std::move(cursor)) { load(at, kHistory); }
+  /// Shows the end. The first and the last message are of these instants.
+  Reading(Cursor cursor, Time begin, Time end)
+      : cursor_(std::move(cursor)), begin_(begin), end_(end) {
+    load(end, kHistory);
+  }
 
   [[nodiscard]] Cursor& cursor() { return cursor_; }
   [[nodiscard]] const Cursor& cursor() const { return cursor_; }
@@ -27,6 +30,8 @@ class Reading {
   [[nodiscard]] Time instant() const { return now_; }
 
   void seek(Time at);
+  /// As Recording::instant_for().
+  [[nodiscard]] Time instant_for(Time stamp) const { return stamp < begin_ ? end_ : stamp; }
   /// Goes to the next message. @return it, until anything else is called; null at the end
   const RecordedMessage* step();
   /// As of State, of the message that step() has returned.
@@ -57,6 +62,8 @@ class Reading {
   [[nodiscard]] bool skips_to(Time at) const;
 
   Cursor cursor_;
+  Time begin_;
+  Time end_;
   std::unique_ptr<State> state_;
   Time now_{};
   std::chrono::nanoseconds span_ = kHistory;  // how much was read before the instant

@@ -79,7 +79,8 @@ Span span_of(const Cursor& cursor) {
 class Recording::Impl {
  public:
   explicit Impl(Cursor cursor)
-      : span_(span_of(cursor)), reading_(std::move(cursor), span_.last.value_or(Time{})) {}
+      : span_(span_of(cursor)),
+        reading_(std::move(cursor), span_.first.value_or(Time{}), span_.last.value_or(Time{})) {}
 
   [[nodiscard]] std::vector<RecordedNews> next() {
     while (const RecordedMessage* message = reading_.step()) {
@@ -167,6 +168,7 @@ RecordingSummary Recording::summary() const {
 void Recording::read_all() { impl_->read_all(); }
 
 void Recording::seek(Time at) { impl_->reading().seek(at); }
+Time Recording::instant_for(Time stamp) const { return impl_->reading().instant_for(stamp); }
 Time Recording::instant() const { return impl_->reading().instant(); }
 bool Recording::step() { return impl_->reading().step() != nullptr; }
 

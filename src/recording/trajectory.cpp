@@ -27,8 +27,10 @@ class Reading::Instants {
         appends_(a, b),
         answers_(instants.size()) {
     std::iota(order_.begin(), order_.end(), std::size_t{0});
-    const auto is_earlier = [&](std::size_t x, std::size_t y) { return instants[x] < instants[y]; };
-    if (!std::is_sorted(instants.begin(), instants.end())) {
+    const auto is_earlier = [&](std::size_t x, std::size_t y) {
+      return reading_.instant_for(instants[x]) < reading_.instant_for(instants[y]);
+    };
+    if (!std::is_sorted(order_.begin(), order_.end(), is_earlier)) {
       std::stable_sort(order_.begin(), order_.end(), is_earlier);
     }
   }
@@ -37,7 +39,7 @@ class Reading::Instants {
     if (!order_.empty()) go_to_next();
     std::size_t looked = SIZE_MAX;  // for which of them it was looked whether messages are skipped
     while (done_ < order_.size()) {
-      if (std::exchange(looked, done_) != done_ && reading_.skips_to(next())) go_to_next();
+      if (std::exchange(looked, done_) != done_ && reading_.skips_to(place())) go_to_next();
       const RecordedMessage* message = reading_.cursor_.front();
       if (message == nullptr) {
         (void)answer(std::nullopt);
@@ -53,9 +55,11 @@ class Reading::Instants {
   static constexpr std::size_t kAtOnce = 256;
 
   [[nodiscard]] Time next() const { return instants_[order_[done_]]; }
+  // Where that is looked up.
+  [[nodiscard]] Time place() const { return reading_.instant_for(next()); }
 
   void go_to_next() {
-    reading_.seek(next());
+    reading_.seek(place());
     begin();
   }
 
@@ -68,7 +72,7 @@ class Reading::Instants {
   void pass(const RecordedMessage& message) {
     const Time log = message.log;
     const bool appends = appends_.only_appends(*reading_.state_, message);
-    const bool answers = !appends || ++passed_ > kAtOnce || is_late(log, next(), wait_);
+    const bool answers = !appends || ++passed_ > kAtOnce || is_late(log, place(), wait_);
     // The answer may have read another place.
     if (answers && !answer(log)) return begin();
     if (answers) passed_ = 0;
@@ -83,14 +87,14 @@ class Reading::Instants {
   [[nodiscard]] bool answer(std::optional<Time> next_message) {
     const State* const state = reading_.state_.get();
     handles_.reset();
-    for (; done_ < order_.size() && (!next_message || next() < *next_message); ++done_) {
+    for (; done_ < order_.size() && (!next_message || place() < *next_message); ++done_) {
       query_.at = next();
       if (answer_fast()) continue;
       const auto X_AB = reading_.lookup(a_, b_, query_);
       find_handles(X_AB.has_value());
       const bool reads_on =
           !X_AB && may_come(X_AB.error().code) && X_AB.error().code != Errc::kUnreachable;
-      if (reads_on && next_message && !is_late(*next_message, next(), wait_)) break;
+      if (reads_on && next_message && !is_late(*next_message, place(), wait_)) break;
       answers_.add(order_[done_], X_AB);
     }
     return state == reading_.state_.get();

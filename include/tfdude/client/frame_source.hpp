@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/client/client.hpp"
@@ -26,6 +27,17 @@ class FrameSource {
   [[nodiscard]] virtual Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                         const Query& query = {},
                                                         Milliseconds wait = {}) = 0;
+
+  /// As Client::lookup() with two instants. @return kUnsupported: this source cannot
+  [[nodiscard]] virtual Result<StampedTransform> lookup_over(
+      std::string_view /*a*/, const Query& /*at_a*/, std::string_view /*b*/, const Query& /*at_b*/,
+      std::string_view /*fixed*/, Milliseconds /*wait*/) {
+    return fail(Errc::kUnsupported, "this source only answers lookups at one time");
+  }
+  /// The frames that are known. @return kUnsupported: this source cannot
+  [[nodiscard]] virtual Result<std::vector<Frame>> frames() {
+    return fail(Errc::kUnsupported, "this source does not tell its frames");
+  }
 };
 
 /// A live system. The client must outlive this.
@@ -37,21 +49,41 @@ class ClientSource final : public FrameSource {
     if (wait > Milliseconds(0)) return client_.lookup(a, b, query, wait);
     return client_.lookup(a, b, query);
   }
+  [[nodiscard]] Result<StampedTransform> lookup_over(std::string_view a, const Query& at_a,
+                                                     std::string_view b, const Query& at_b,
+                                                     std::string_view fixed,
+                                                     Milliseconds wait) override {
+    return client_.lookup(a, at_a, b, at_b, fixed, wait);
+  }
+  [[nodiscard]] Result<std::vector<Frame>> frames() override { return client_.frames(); }
 
  private:
   Client& client_;
 };
 
-/// A recording, at the instant that it shows; with an instant in the query, at that one. The
-/// recording must outlive this.
+/// A recording, at the instant that it shows; with an instant in the query, at that one. Nobody has
+/// to wait for a recording: without a wait, it is read on as far as Recording::lookup_at() does by
+/// itself. The recording must outlive this.
+/// @par Thread safety  One thread at a time.
 class RecordingSource final : public FrameSource {
  public:
   explicit RecordingSource(Recording& recording) : recording_(recording) {}
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query, Milliseconds wait) override {
     if (!query.at) return recording_.lookup(a, b, query);
+    if (wait <= Milliseconds(0)) return recording_.lookup_at(a, b, *query.at, query);
     return recording_.lookup_at(a, b, *query.at, query, wait);
   }
+  /// Without an instant, at the one that is shown. Reads on as without a wait.
+  [[nodiscard]] Result<StampedTransform> lookup_over(std::string_view a, const Query& at_a,
+                                                     std::string_view b, const Query& at_b,
+                                                     std::string_view fixed,
+                                                     Milliseconds /*wait*/) override {
+    const Time shown = recording_.instant();
+    return recording_.lookup_at(a, at_a.at.value_or(shown), b, at_b.at.value_or(shown), fixed,
+                                at_a);
+  }
+  [[nodiscard]] Result<std::vector<Frame>> frames() override { return recording_.frames(); }
 
  private:
   Recording& recording_;

@@ -80,6 +80,9 @@ class TFDUDE_EXPORT Recording {
   /// Goes to an instant. From the next earlier place where all values are written once more, or
   /// from where it is, the file is read up to there: mostly 8 to 16 MB.
   void seek(Time at);
+  /// Where a stamp is looked up: at that instant, or at the end if it is before the beginning, as
+  /// stamps of another clock are.
+  [[nodiscard]] Time instant_for(Time stamp) const;
   /// The instant that is shown.
   [[nodiscard]] Time instant() const;
   /// Goes to the next message. @return whether there is one
@@ -89,8 +92,8 @@ class TFDUDE_EXPORT Recording {
   /// @return as Client::lookup()
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query = {});
-  /// X_AB at a stamp, as Client::lookup() with a wait answered it when it was asked at that
-  /// instant: goes there, and then on until all edges have their data.
+  /// X_AB at a stamp, as Client::lookup() with a wait answered it when it was asked at
+  /// instant_for() it: goes there, and then on until all edges have their data.
   /// @param wait  how long, of the time of the recording
   [[nodiscard]] Result<StampedTransform> lookup_at(std::string_view a, std::string_view b, Time at,
                                                    const Query& query = {},

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/client/frame_source.hpp"
 #include "tfdude/recording/recording.hpp"
+#include "tfdude/tf2.hpp"
 
 #include "base/cdr.hpp"
 #include "recording/mcap_writer.hpp"
@@ -127,6 +129,65 @@ TEST_CASE("recording of ROS: a stamp of 0 was not set, and means the time of the
   CHECK(X->pose.translation().x() == 2.5);
   REQUIRE(recording->summary().problems.size() == 1);
   CHECK_THAT(recording->summary().problems[0], ContainsSubstring("no stamp"));
+}
+
+TEST_CASE("recording of ROS: stamps of another clock are looked up at the end") {
+  std::vector<Sent> all;
+  for (int i = 0; i < 40; ++i) all.push_back(sample(i, i + 1));
+  const std::string file = file_of(all, "/tf", 0, 1'700'000'000);
+  const auto at = [](double seconds) { return time_of(std::llround(seconds * 1e9)); };
+  const auto x = [](const Result<StampedTransform>& X) {
+    return X ? X->pose.translation().x() : -1;
+  };
+  auto recording = Recording::read(file);
+  REQUIRE(recording);
+  const Time end = *recording->summary().end;
+  CHECK(recording->instant_for(at(5.5)) == end);
+  CHECK(recording->instant_for(end) == end);
+  CHECK(recording->instant_for(*recording->summary().start) == *recording->summary().start);
+  // Wherever the recording is.
+  for (const Time shown : {end, *recording->summary().start, at(5)}) {
+    recording->seek(shown);
+    CHECK(x(recording->lookup_at("odom", "base", at(5.5))) == 4.5);
+    CHECK(recording->instant() == end);
+  }
+  CHECK(x(recording->lookup_at("base", at(3), "base", at(5), "odom")) == 2);
+  CHECK(recording->lookup_at("odom", "base", at(50)).error().code == Errc::kNotYet);
+  CHECK(recording->lookup_at("odom", "base", at(0.5)).error().code == Errc::kTooOld);
+  for (const Time shown : {end, at(5)}) {
+    auto other = Recording::read(file);
+    REQUIRE(other);
+    other->seek(shown);
+    // The last of these stamps is of the clock of the recording.
+    const Trajectory path = other->trajectory("odom", "base", {at(30.5), at(2), at(0.5), end});
+    REQUIRE(path.X_AB.size() == 4);
+    CHECK(path.X_AB[0].value().pose.translation().x() == 29.5);
+    CHECK(path.X_AB[1].value().pose.translation().x() == 1);
+    REQUIRE(path.missing.size() == 2);
+  }
+}
+
+TEST_CASE("recording of ROS: a buffer over it needs no timeouts") {
+  std::vector<Sent> all;
+  for (int i = 0; i < 40; ++i) all.push_back(sample(i, i + 10));
+  auto recording = Recording::read(file_of(all, "/tf"));
+  REQUIRE(recording);
+  RecordingSource source(*recording);
+  const tf2_ros::Buffer buffer(source);
+  using std::chrono::milliseconds;
+  const auto x = [&](int ms) {
+    return buffer.lookupTransform("odom", "base", milliseconds(ms)).transform.translation.x;
+  };
+  CHECK(x(20'500) == 10.5);
+  CHECK(x(12'250) == 2.25);
+  // A timeout counts in the time of the recording.
+  CHECK_FALSE(buffer.canTransform("odom", "base", milliseconds(20'500), milliseconds(100)));
+  CHECK(buffer._frameExists("/odom"));
+  CHECK_FALSE(buffer._frameExists("moon"));
+  CHECK(buffer.getAllFrameNames().size() == 2);
+  CHECK(buffer.lookupTransform("base", milliseconds(12'500), "base", milliseconds(15'000), "odom")
+            .transform.translation.x == 2.5);
+  CHECK_THROWS_AS(x(90'000), tf2::ExtrapolationException);
 }
 
 TEST_CASE("recording of ROS: 0 at the start of simulated time is that time") {
