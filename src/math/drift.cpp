@@ -14,9 +14,13 @@ namespace {
 // since. So of two values between samples the difference may lack a lever, and have negative
 // variances along axes to which nothing is added. They count that many times then, and what is
 // positive a little more, which is enough for any correlation that was lost by it.
-constexpr double kMoreOfPositive = 1.25;
-constexpr double kMoreOfLacking = 5.0;
-constexpr double kSmallBesideWhole = 1e-3;
+constexpr double kMoreOfPositive = 1.05;
+constexpr double kMoreOfLacking = 20.0;
+// So little of the whole may lack for any reason: counted so many times, it does no harm.
+constexpr double kSmallBesideWhole = 0.1;
+// More may lack along an axis that has had hardly any error but by this lever.
+constexpr double kHardly = 0.05;
+constexpr double kLeastTimes = 0.5;
 constexpr double kMostTimes = 100;
 constexpr double kRoundingOfSum = 1e-9;
 constexpr double kNothing = 1e-12;  // of the variance, left by rounding
@@ -54,7 +58,7 @@ Parts parts_of(Matrix6d rest) {
 }
 
 // Whether levers may be what is lacking. Otherwise an observation has corrected the later value.
-// @param before  the own part of the earlier value
+// @param before  the own part of the earlier value, in the same units
 // @param of_lever  what the lever of the way makes of it
 bool may_lack(const Parts& parts, const Matrix6d& before, const Matrix6d& of_lever) {
   // What was added since the sample before is so many times what was added in between, at most.
@@ -64,8 +68,9 @@ bool may_lack(const Parts& parts, const Matrix6d& before, const Matrix6d& of_lev
     if (added > kNothing) times = std::max(times, std::min(before(k, k) / added, kMostTimes));
   }
   for (Eigen::Index k = 0; k < 6; ++k) {
-    const double most = kSmallBesideWhole + 2 * (1 + times) * of_lever(k, k);
-    if (parts.lacking(k, k) > most) return false;
+    const bool by_lever = times > kLeastTimes && before(k, k) <= kHardly * of_lever(k, k);
+    const double of_levers = by_lever ? 2 * (1 + times) * of_lever(k, k) : 0.0;
+    if (parts.lacking(k, k) > kSmallBesideWhole + of_levers) return false;
   }
   return true;
 }

@@ -67,7 +67,7 @@ double smallest_share(const Matrix6d& got, const Matrix6d& wanted, Random& rando
 
 }  // namespace
 
-TEST_CASE("drift between: noise on some axes only has no bound, and no less than it adds") {
+TEST_CASE("drift between: noise on some axes only seldom has a bound, and no less than it adds") {
   Random random(8101);
   INFO("seed " << random.seed());
   Drive drive;
@@ -77,6 +77,7 @@ TEST_CASE("drift between: noise on some axes only has no bound, and no less than
     drive.Q = of_deviations(noise);
     for (const double turns : {0.0, 0.5, 2.0}) {
       drive.velocity << 1, 0, 0, 0, 0, turns;
+      int bounds = 0;
       for (int round = 0; round < 200; ++round) {
         // From the start of the history, and later; within one interval, and beyond.
         const double first = random.uniform(0, round % 2 == 0 ? 0.3 : 5);
@@ -86,7 +87,11 @@ TEST_CASE("drift between: noise on some axes only has no bound, and no less than
         const Belief earlier = drive.at(first);
         const Belief later = drive.at(first + over);
         const auto drift = drift_between(earlier, later);
-        REQUIRE(drift);
+        if (!drift) {
+          CHECK(first < 3 * kInterval);
+          ++bounds;
+          continue;
+        }
         const Matrix6d added = drift->added.matrix();
         const Matrix6d least =
             later.own.matrix() - drift->F * earlier.own.matrix() * drift->F.transpose();
@@ -98,28 +103,58 @@ TEST_CASE("drift between: noise on some axes only has no bound, and no less than
         const bool within = std::floor(first / kInterval) == std::floor((first + over) / kInterval);
         if (within) CHECK(smallest_share(added, over * drive.Q, random) > 0.95);
       }
+      INFO("noise " << noise.transpose() << ", turns " << turns);
+      CHECK(bounds < 30);
     }
   }
 }
 
 TEST_CASE("drift between: a correction of the later value alone leaves no drift") {
+  Random random(8102);
+  INFO("seed " << random.seed());
   Drive drive;
   drive.Q = of_deviations(deviations(0.06, 0.06, 0.03));
   drive.velocity << 1, 0, 0, 0, 0, 0.5;
-  const Belief earlier = drive.at(2.03);
-  REQUIRE(drift_between(earlier, drive.at(2.05)));
-  for (const double rest : {0.0, 0.5, 0.9}) {
-    INFO("rest " << rest);
-    Belief later = drive.at(2.05);
-    later.own = Covariance::trusted(Matrix6d(rest * later.own.matrix()));
-    CHECK_FALSE(drift_between(earlier, later));
+  for (const double first : {0.53, 2.03, 9.03}) {
+    for (const double over : {0.02, 0.5, 2.0, 8.0}) {
+      INFO(over << " s from " << first);
+      const Belief earlier = drive.at(first);
+      const Belief predicted = drive.at(first + over);
+      REQUIRE(drift_between(earlier, predicted));
+      const Matrix6d sigma = predicted.own.matrix();
+      Belief later = predicted;
+      later.own = {};
+      CHECK_FALSE(drift_between(earlier, later));
+      if (over > first) continue;  // most of the error has been added since
+      // What was seen of one direction.
+      for (const Eigen::Index axis : {0, 1, 5}) {
+        INFO("axis " << axis);
+        const Twist seen = sigma.col(axis);
+        later.own = Covariance::trusted(
+            Matrix6d(sigma - 0.9 / sigma(axis, axis) * seen * seen.transpose()));
+        const auto drift = drift_between(earlier, later);
+        if (!drift) continue;
+        // A small correction may be taken for a lever. The covariance is then hardly too small.
+        Matrix6d left = Matrix6d::Identity();
+        left.col(axis) -= 0.9 / sigma(axis, axis) * seen;
+        const Matrix6d carried = drift->F * earlier.own.matrix();
+        for (int k = 0; k < 200; ++k) {
+          Twist before;
+          Twist after;
+          for (Twist* v : {&before, &after}) {
+            for (double& one : *v) one = random.normal();
+          }
+          const double right = before.dot(earlier.own.matrix() * before) +
+                               2 * after.dot(left * carried * before) +
+                               after.dot(later.own.matrix() * after);
+          const Twist both = before + drift->F.transpose() * after;
+          const double got =
+              both.dot(earlier.own.matrix() * both) + after.dot(drift->added.matrix() * after);
+          CHECK(got > 0.98 * right);
+        }
+      }
+    }
   }
-  // One direction only.
-  Belief later = drive.at(2.05);
-  const Matrix6d sigma = later.own.matrix();
-  const Twist seen = sigma.col(1);
-  later.own = Covariance::trusted(Matrix6d(sigma - 0.5 / sigma(1, 1) * seen * seen.transpose()));
-  CHECK_FALSE(drift_between(earlier, later));
 }
 
 }  // namespace tfdude
