@@ -42,8 +42,8 @@ const std::string kRun = "ros2 run tf2_ros static_transform_publisher ";
 const std::string kStart = kRun + "1 2 3 0 0 0 a b\n";
 
 TEST_CASE("frame file: words of any length are read in a shell script") {
-  for (const std::string long_word : {std::string(300'000, 'A'), std::string(300'000, '1'),
-                                      std::string(300'000, '$'), std::string(300'000, '\\')}) {
+  for (const char filler : {'A', '1', '$', '\\'}) {
+    const std::string long_word(300'000, filler);
     CHECK(edges_of(kStart + "echo \"<" + long_word + "A\" | base64 -d\n") == "a>b ");
     CHECK(edges_of(kStart + "cat <" + long_word + "A >" + long_word + "A\n") == "a>b ");
     CHECK(edges_of("cat <<" + long_word + "A\n" + long_word + "\n" + long_word + "A\n" + kStart)
