@@ -16,8 +16,8 @@
 // docs/coming-from-tf2.md says which two lines of a node change, and what differs.
 namespace tfdude::tf2_ros {
 
-/// tf2_ros's buffer. All functions may be called from any thread. They ask the owners of frames, so
-/// nothing has to be filled, and no listener is needed.
+/// tf2_ros's buffer. All functions may be called from any thread, of a recording by one at a time.
+/// They ask the owners of frames, so nothing has to be filled, and no listener is needed.
 class Buffer {
  public:
   /// Joins the domain of the environment (Options). @throws tf2::TransformException

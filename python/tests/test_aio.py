@@ -144,6 +144,22 @@ def test_two_loops_over_the_same(client, node):
         messages.close()
         await asyncio.wait_for(asyncio.gather(*tasks), 20)
 
+    asyncio.run(asyncio.wait_for(main(), 40))
+
+
+def test_a_loop_that_closes_its_filter_ends_the_other_one(client):
+    async def main():
+        messages = tfdude.MessageFilter(client, "base", max_age=20)
+
+        async def loop():
+            async for _ in messages:
+                messages.close()
+
+        tasks = [asyncio.create_task(loop()) for _ in range(2)]
+        await asyncio.sleep(0.01)
+        messages.push("one", "tool", START)
+        await asyncio.wait_for(asyncio.gather(*tasks), 20)
+
     asyncio.run(main())
 
 

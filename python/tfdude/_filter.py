@@ -119,6 +119,7 @@ class MessageFilter(Generic[Message]):
             if found is not None:
                 yield found
             elif self._over():
+                self._mailbox.wake()  # other loops, which wait for what this one has taken
                 return
             else:
                 await _until_readable(self._mailbox)

@@ -49,7 +49,7 @@ Result<LookupInProgress> LookupInProgress::plan(const Forest& forest, const Dire
   const auto hint = query.at ? std::nullopt : hints.guess(a, b, now);
   auto plan = route_lookup(forest, directory, a, b, query, hint);
   if (!plan) return tl::unexpected(std::move(plan.error()));
-  LookupInProgress lookup(*std::move(plan), wanted, hint);
+  LookupInProgress lookup(*std::move(plan), wanted, hint, now);
   lookup.differs_ = other_clock(directory, own, lookup.parts());
   // The age of an instant is a difference of two times, which must be of one clock.
   if (!query.age_noise_until || lookup.differs_.empty()) return lookup;
@@ -80,7 +80,7 @@ std::optional<Result<StampedTransform>> LookupInProgress::take(std::vector<Reply
   const bool newest =
       !plan_.parts.empty() && !std::get<LookupRequest>(plan_.parts.front().request.body).query.at;
   if (!newest || plan_.parts.size() == 1) return assembled(*answers);
-  hints.note(a_, b_, now, *answers);
+  hints.note(a_, b_, planned_, now, *answers);
   slowest_ = slowest(*answers);
   OneInstant found = one_instant(*std::move(answers), hint_);
   if (!found.ask_again) return assembled(found.answers);

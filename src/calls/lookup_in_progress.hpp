@@ -24,10 +24,10 @@ class SharedHints {
     const Lock lock(mutex_);
     return hints_.guess(a, b, now);
   }
-  void note(std::string_view a, std::string_view b, Steady now,
+  void note(std::string_view a, std::string_view b, Steady planned, Steady now,
             const std::vector<SegmentValues>& answers) {
     const Lock lock(mutex_);
-    hints_.note(a, b, now, answers);
+    hints_.note(a, b, planned, now, answers);
   }
 
  private:
@@ -70,8 +70,9 @@ class LookupInProgress {
                                                              SharedHints::Steady now);
 
  private:
-  LookupInProgress(LookupPlan plan, const WantedLookup& wanted, std::optional<Time> hint)
-      : plan_(std::move(plan)), a_(wanted.a), b_(wanted.b), hint_(hint) {}
+  LookupInProgress(LookupPlan plan, const WantedLookup& wanted, std::optional<Time> hint,
+                   SharedHints::Steady now)
+      : plan_(std::move(plan)), a_(wanted.a), b_(wanted.b), hint_(hint), planned_(now) {}
 
   /// Says in an error about time what may be its reason: another clock, or why a second round asked
   /// for the instant.
@@ -82,6 +83,7 @@ class LookupInProgress {
   std::string a_;
   std::string b_;
   std::optional<Time> hint_;            // the instant predicted when the plan was made
+  SharedHints::Steady planned_;         // then
   std::string differs_;                 // that an owner has another clock; empty: none has
   std::optional<std::size_t> slowest_;  // the part whose newest instant a second round asks for
 };

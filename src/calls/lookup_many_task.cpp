@@ -49,6 +49,7 @@ Result<void> LookupManyTask::plan(const Directory& directory, Clock::time_point 
   restart();
   at_ = query_.at && *query_.at < Time{} ? Time{} : query_.at;
   hint_ = query_.at ? std::nullopt : hints_.guess(key_, {}, now);
+  planned_at_ = now;
   Result<void> outcome;
   differs_.clear();
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
@@ -233,7 +234,7 @@ bool LookupManyTask::again_at_one_instant(Clock::time_point now) {
   std::vector<SegmentValues> answers;
   answers.reserve(groups_.size());
   for (const Group& group : groups_) answers.push_back(*group.answer);
-  hints_.note(key_, {}, now, answers);
+  hints_.note(key_, {}, planned_at_, now, answers);
   OneInstant found = one_instant(std::move(answers), hint_);
   if (!found.ask_again) {
     for (std::size_t i = 0; i < groups_.size(); ++i) {

@@ -87,6 +87,7 @@ class LookupManyTask final : public Task {
   std::vector<Part> parts_;
   std::optional<Time> at_;  // for which is asked now
   std::optional<Time> hint_;
+  Clock::time_point planned_at_;
   std::string differs_;  // that an owner has another clock
   int refusals_ = 0;     // replies that the plan is outdated
   std::vector<Found> found_;

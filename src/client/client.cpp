@@ -188,7 +188,9 @@ Result<std::vector<JointInfo>> Client::joints(const std::string& partition, Mill
 }
 
 Result<ClockDifference> Client::clock_difference(const std::string& partition) {
-  return participant_->queries().clock_difference(partition);
+  constexpr int kRoundTrips = 8;
+  return participant_->queries().clock_difference(
+      partition, participant_->discovery().call_deadline(), kRoundTrips);
 }
 
 Result<std::string> Client::description(const std::string& partition) {

@@ -25,12 +25,13 @@ using Start = LaunchStart;
 
 // Those of ROS 2 itself end at "--", or at the end.
 void drop_ros_arguments(Words& words) {
-  for (auto at = words.begin();;) {
-    at = std::find(at, words.end(), "--ros-args");
-    if (at == words.end()) return;
-    const auto end = std::find(at, words.end(), "--");
-    at = words.erase(at, end == words.end() ? end : end + 1);
-  }
+  bool drops = false;
+  const auto is_of_ros = [&](const std::string& word) {
+    const bool was = drops;
+    drops = drops ? word != "--" : word == "--ros-args";
+    return was || drops;
+  };
+  words.erase(std::remove_if(words.begin(), words.end(), is_of_ros), words.end());
 }
 
 class Arguments {

@@ -65,6 +65,8 @@ class ShellCommands {
         at_ = std::min(text_.find('\n', at_), text_.size());
       } else if (const auto size = size_of_redirection(); size > 0) {
         ok = redirection(size);
+      } else if (command_.line == 0 && here() == '(' && here(1) == '(') {
+        skip_arithmetic();
       } else if (is_one_of(here(), ";&|()")) {
         end_command();
         ++at_;
@@ -73,12 +75,18 @@ class ShellCommands {
         ok = word(command_.words.emplace_back());
       }
       if (!ok) return tl::unexpected(std::move(ok.error()));
+      if (commands_.size() > kMostCommands) {
+        return file_error(Errc::kTooMuch, file_, line_,
+                          "more than " + std::to_string(kMostCommands) + " commands");
+      }
     }
     if (auto ok = end_line(); !ok) return tl::unexpected(std::move(ok.error()));
     return std::move(commands_);
   }
 
  private:
+  static constexpr std::size_t kMostCommands = 200'000;
+
   struct HereDocument {
     std::string end;
     bool is_indented = false;
@@ -103,6 +111,14 @@ class ShellCommands {
   void join_lines() {
     at_ += here(1) == '\r' ? 3U : 2U;
     ++line_;
+  }
+
+  // Its "<<" is no here-document.
+  void skip_arithmetic() {
+    const std::size_t end = std::min(text_.find("))", at_), text_.size());
+    line_ += static_cast<int>(std::count(text_.begin() + static_cast<long>(at_),
+                                         text_.begin() + static_cast<long>(end), '\n'));
+    at_ = std::min(end + 2, text_.size());
   }
 
   void begin_command() {

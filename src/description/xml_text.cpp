@@ -59,9 +59,11 @@ int line_of_too_many_attributes(std::string_view text) {
 // 0: there is none.
 int line_of_entities(const tinyxml2::XMLDocument& document) {
   for (const auto* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    if (node->ToUnknown() == nullptr) continue;
+    // TinyXML ends one at the first '>', and a further declaration is then one of its own.
+    const std::string_view value = node->Value();
     const bool declares =
-        node->ToUnknown() != nullptr &&
-        std::string_view(node->Value()).find("<!ENTITY") != std::string_view::npos;
+        value.rfind("ENTITY", 0) == 0 || value.find("<!ENTITY") != std::string_view::npos;
     if (declares) return node->GetLineNum();
   }
   return 0;

@@ -77,7 +77,7 @@ class Update {
     }
     if (unknown.size() == 1 && !prior_.has_path()) {
       prior_.take_unknown(unknown.front());
-    } else if (!prior_.edges().empty()) {
+    } else if (prior_.has_path()) {
       const auto H = at_start().H;
       for (const std::size_t k : unknown) {
         R_ = bound(R_, seen(H[k], all_[k].X_PC.unknown->matrix()));

@@ -10,6 +10,20 @@ namespace tfdude {
 
 using Standing = Succession::Standing;
 
+namespace {
+
+// Of partitions that nobody calls silent any more.
+template <class Partitions>
+void end_silences(Partitions& partitions, const Absences& absences) {
+  for (auto& partition : partitions) {
+    if (!partition.info.silent) continue;
+    const auto absence = absences.find(partition.info.name);
+    partition.info.silent = absence && absence->kind == Absent::Kind::kSilent;
+  }
+}
+
+}  // namespace
+
 // What this participant knows of an absent partition, if it tells others: one without a partition
 // cannot.
 std::optional<Absent> Directory::told_absence(const Known& partition) const {
@@ -60,6 +74,7 @@ void Directory::mark_absent(Known& partition, Owner owner, bool stopped, Time no
   partition.info.since = now;
   absences_.mark_absent(partition.info.name, partition.live, stopped, now, early);
   absences_.teller_gone(partition.info.name);
+  end_silences(partitions_, absences_);
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
@@ -88,11 +103,8 @@ bool Directory::look_for_gone(Absences::Steady now) {
   const bool news = looked.counts || !looked.gone.empty();
   if (!news) return false;
   tell_claims();
-  for (Known& partition : partitions_) {
-    const auto absence = absences_.find(partition.info.name);
-    if (absence && absence->kind != Absent::Kind::kSilent) partition.info.silent = false;
-    forget_if_gone(partition, partition.info.since);
-  }
+  end_silences(partitions_, absences_);
+  for (Known& partition : partitions_) forget_if_gone(partition, partition.info.since);
   return true;
 }
 
@@ -136,6 +148,7 @@ void Directory::hear_absent(Owner from, const Presence& presence) {
     if (known_of.size() > Absences::kMost) known_of.erase(known_of.begin());
     hear_forgotten(partitions_[number], one, same_process && is_new);
   }
+  end_silences(partitions_, absences_);
   // What the sender no longer forgets, it has heard a later process of.
   for (const std::string& name : std::exchange(partitions_[from].forgets, forgets)) {
     if (forgets.count(name) != 0) continue;

@@ -67,7 +67,7 @@ std::optional<Time> LatestHints::guess(std::string_view a, std::string_view b, S
   return std::max(later_by(*entry.certain, now - entry.seen), entry.latest);
 }
 
-void LatestHints::note(std::string_view a, std::string_view b, Steady now,
+void LatestHints::note(std::string_view a, std::string_view b, Steady planned, Steady now,
                        const std::vector<SegmentValues>& answers) {
   const SegmentValues* last = slowest(answers);
   const std::size_t path = hash_of(a, b);
@@ -76,7 +76,9 @@ void LatestHints::note(std::string_view a, std::string_view b, Steady now,
   const bool known = entry.path == path;
   const bool same = all_of(answers, *last->stamp);
   const int together = same ? (known ? entry.together + 1 : kStreak) : 0;
-  entry = {path, last->stamp, *last->stamp, now, std::min(together, kStreak)};
+  const bool overlaps = known && planned < entry.seen;
+  const Time latest = overlaps ? std::max(entry.latest, *last->stamp) : *last->stamp;
+  entry = {path, last->stamp, latest, now, std::min(together, kStreak)};
   if (together >= kStreak) {
     entry.certain.reset();
     return;

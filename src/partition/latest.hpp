@@ -46,7 +46,9 @@ class LatestHints {
   [[nodiscard]] std::optional<Time> guess(std::string_view a, std::string_view b, Steady now) const;
 
   /// Records the newest instants of the owners.
-  void note(std::string_view a, std::string_view b, Steady now,
+  /// @param planned  when the lookup was begun: its answers may be older than those of others that
+  ///   have ended since
+  void note(std::string_view a, std::string_view b, Steady planned, Steady now,
             const std::vector<SegmentValues>& answers);
 
  private:

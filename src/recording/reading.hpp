@@ -8,6 +8,7 @@
 
 #include "tfdude/types/many.hpp"
 
+#include "base/saturating.hpp"
 #include "recording/cursor.hpp"
 #include "recording/state.hpp"
 
@@ -31,7 +32,9 @@ class Reading {
 
   void seek(Time at);
   /// As Recording::instant_for().
-  [[nodiscard]] Time instant_for(Time stamp) const { return stamp < begin_ ? end_ : stamp; }
+  [[nodiscard]] Time instant_for(Time stamp) const {
+    return stamp < earlier_by(begin_, kHistory) ? end_ : stamp;
+  }
   /// Goes to the next message. @return it, until anything else is called; null at the end
   const RecordedMessage* step();
   /// As of State, of the message that step() has returned.

@@ -204,11 +204,10 @@ Result<std::vector<HistoryInfo>> Queries::histories(const std::string& partition
 
 // The owner's clock is read once between the request and the reply. So its difference is known to
 // within half of the round trip, and best by the fastest one.
-Result<ClockDifference> Queries::clock_difference(const std::string& partition) {
-  constexpr int kRoundTrips = 8;
-  const Deadline deadline = discovery_.call_deadline();
+Result<ClockDifference> Queries::clock_difference(const std::string& partition,
+                                                  const Deadline& deadline, int round_trips) {
   std::optional<ClockDifference> best;
-  for (int i = 0; i < kRoundTrips; ++i) {
+  for (int i = 0; i < round_trips; ++i) {
     // The part of a description after its end: nothing.
     constexpr std::uint64_t kEnd = UINT64_MAX;
     auto part = requests_.find(deadline, [&](const Directory& directory) {

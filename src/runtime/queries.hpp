@@ -40,7 +40,8 @@ class Queries {
   /// The history of a frame's edge, and those of all edges of a partition.
   [[nodiscard]] Result<std::vector<HistoryInfo>> history(const std::string& id);
   [[nodiscard]] Result<std::vector<HistoryInfo>> histories(const std::string& partition);
-  [[nodiscard]] Result<ClockDifference> clock_difference(const std::string& partition);
+  [[nodiscard]] Result<ClockDifference> clock_difference(const std::string& partition,
+                                                         const Deadline& deadline, int round_trips);
 
  private:
   [[nodiscard]] Result<std::vector<Frame>> followed();

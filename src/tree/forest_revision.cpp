@@ -272,6 +272,8 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   if (is_newest) end_revision(fresh, value.revision != nullptr ? Ties::kStay : Ties::kEnd);
   fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
+  // Its partners do not know the edge any more, so that no other sample is tied to them for sure.
+  if (is_newest && value.revision == nullptr) fresh.samples->set_observed(fresh.commit);
   fresh.number = fresh.samples->next() - 1;
   if (superseded->has_instants(place) || superseded->has_instants(place + 1)) begin_again(fresh);
   reclaimer_.supersede(superseded);

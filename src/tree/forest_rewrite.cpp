@@ -103,6 +103,9 @@ void Forest::Impl::replace_samples(const HeldVersion& newest, std::int64_t from,
   fresh->continue_from(before, replaced, newest.history, from);
   if (none) fresh->forget_earlier();
   fresh->rewritten = edge.commit;
+  // As of replace_sample(); and one that was too long ago to take part may come nearer.
+  const bool ends = !keeps_newest && samples.back().revision == nullptr;
+  if (ends || samples.size() < replaced.end - replaced.first) fresh->set_observed(edge.commit);
   edge.samples = fresh;
   edge.number = fresh->next() - 1;
   edge.history = edge.commit;

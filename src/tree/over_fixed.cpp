@@ -294,6 +294,13 @@ StampedTransform over_fixed(const StampedTransform& X_FA, const StampedTransform
     basis.sources = X_FA.basis.sources;
     add_once(X_FB.basis.sources, basis.sources);
     basis.bound = X_FA.basis.bound || X_FB.basis.bound;
+    basis.lost = X_FA.basis.lost;
+    for (const LostOwner& one : X_FB.basis.lost) {
+      const bool known = std::any_of(basis.lost.begin(), basis.lost.end(), [&](const auto& other) {
+        return other.partition == one.partition;
+      });
+      if (!known) basis.lost.push_back(one);
+    }
     return X_AB;
   }
   const bool same_instant = X_FA.stamp && X_FA.stamp == X_FB.stamp;

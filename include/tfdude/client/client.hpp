@@ -227,9 +227,9 @@ class TFDUDE_EXPORT Client {
   /// A path of own edges of a Node uses no network, no lock and no allocation. Other paths take one
   /// round trip, however many partitions they cross, or two if the partitions have no common
   /// instant near the predicted one. An answer at a predicted instant may be older than the latest
-  /// common time: by up to two samples of the slowest edge, and 20 ms. It is never older than an
-  /// earlier answer. A handle is valid for this client only; other clients treat it as an unknown
-  /// frame.
+  /// common time: by up to two samples of the slowest edge, and 20 ms. Of answers of the owners,
+  /// none is older than an earlier one. A handle is valid for this client only; other clients treat
+  /// it as an unknown frame.
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (all edges have no instant
   ///   in common).
   [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);

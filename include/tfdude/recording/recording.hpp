@@ -80,8 +80,8 @@ class TFDUDE_EXPORT Recording {
   /// Goes to an instant. From the next earlier place where all values are written once more, or
   /// from where it is, the file is read up to there: mostly 8 to 16 MB.
   void seek(Time at);
-  /// Where a stamp is looked up: at that instant, or at the end if it is before the beginning, as
-  /// stamps of another clock are.
+  /// Where a stamp is looked up: at that instant, or at the end if it is more than 10 s before the
+  /// beginning, as stamps of another clock are.
   [[nodiscard]] Time instant_for(Time stamp) const;
   /// The instant that is shown.
   [[nodiscard]] Time instant() const;

@@ -2,6 +2,7 @@
 
 #include "tfdude/source.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <unistd.h>
@@ -13,7 +14,7 @@
 namespace tfdude::cli {
 namespace {
 
-Time at(double seconds) { return time_of(static_cast<std::int64_t>(seconds * 1e9)); }
+Time at(double seconds) { return time_of(std::llround((1000 + seconds) * 1e9)); }
 
 // Two frames that are at the time in metres, told in turns, from 1 s to 5 s.
 Recording two_that_move() {
@@ -67,14 +68,17 @@ TEST_CASE("source: a recording is read on for each frame at one instant") {
 TEST_CASE("source: a stamp of another clock is answered as of the end") {
   Recording recording = two_that_move();
   Source source(recording);
-  source.go_to(at(0.5));
+  const Time other = at(-995);
+  source.go_to(other);
   CHECK(recording.instant() == at(5));
   CHECK(source.frames()->size() == 3);
   Query query;
-  query.at = at(0.5);
+  query.at = other;
   CHECK(source.lookup("base", "arm", query).error().code == Errc::kTooOld);
   query.at = at(1.5);
   CHECK(source.lookup("base", "arm", query));
+  // One just before the beginning is of this clock: nothing is known then.
+  CHECK(recording.instant_for(at(0.5)) == at(0.5));
 }
 
 }  // namespace tfdude::cli

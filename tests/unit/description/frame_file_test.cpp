@@ -97,14 +97,30 @@ TEST_CASE("frame file: arguments of ROS 2 end at two dashes") {
   CHECK(edges_of(node("--ros-args -r __node:=st -- " + flags)) == "a>b ");
   CHECK(edges_of(node(flags + " --ros-args -r __node:=st --log-level info")) == "a>b ");
   CHECK(edges_of(node("--ros-args -p x:=1 -- " + flags + " --ros-args -p y:=2 --")) == "a>b ");
+  // In time that grows with the length only.
+  std::string many = flags;
+  for (int i = 0; i < 200'000; ++i) many += " --ros-args --";
+  CHECK(edges_of(node(many)) == "a>b ");
+}
+
+TEST_CASE("frame file: arithmetic in a shell script has no here-document") {
+  CHECK(edges_of("(( x = 1 << 3 ))\n" + kStart) == "a>b ");
+  CHECK(edges_of("((\n1 << 3))\n" + kStart + "3\n") == "a>b ");
+  const std::string many(500'000, ';');
+  CHECK(edges_of(many + "\n" + kStart) == "a>b ");
+  std::string commands;
+  for (int i = 0; i < 300'000; ++i) commands += ";a";
+  CHECK_THAT(refusal(kStart + commands), ContainsSubstring("commands"));
 }
 
 TEST_CASE("frame file: entities that XML declares are not read") {
-  const std::string text =
-      "<?xml version='1.0'?>\n<!DOCTYPE launch [ <!ENTITY b 'base'> ]>\n<launch><node "
-      "pkg='tf2_ros' "
-      "exec='static_transform_publisher' args='1 2 3 0 0 0 &b; c'/></launch>";
-  CHECK_THAT(refusal(text), ContainsSubstring("file:2: entities are not read"));
+  for (const char* before : {"", "<!ELEMENT launch ANY> ", "<!-- the base --> "}) {
+    const std::string text =
+        "<?xml version='1.0'?>\n<!DOCTYPE launch [ " + std::string(before) +
+        "<!ENTITY b 'base'> ]>\n<launch><node pkg='tf2_ros' "
+        "exec='static_transform_publisher' args='1 2 3 0 0 0 &b; c'/></launch>";
+    CHECK_THAT(refusal(text), ContainsSubstring("file:2: entities are not read"));
+  }
 }
 
 TEST_CASE("frame file: escapes in strings of Python stand for what they do in Python") {

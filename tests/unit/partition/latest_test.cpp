@@ -70,21 +70,21 @@ TEST_CASE("a guess is one period behind the expected newest sample of the slowes
   LatestHints hints;
   const Steady start{};
   CHECK_FALSE(hints.guess("a", "b", start));
-  hints.note("a", "b", start, {answer(ms(100), 1), answer(ms(90), 2)});
+  hints.note("a", "b", start, start, {answer(ms(100), 1), answer(ms(90), 2)});
   // Not before what all are known to have.
   CHECK(hints.guess("a", "b", start) == ms(90));
   CHECK(hints.guess("a", "b", start + 25ms) == ms(105));
   CHECK_FALSE(hints.guess("b", "a", start));
   // If all owners repeatedly have the same instant, there is nothing to guess.
   const std::vector<SegmentValues> same{answer(ms(130), 1), answer(ms(130), 2)};
-  hints.note("c", "d", start, same);
+  hints.note("c", "d", start, start, same);
   CHECK_FALSE(hints.guess("c", "d", start));
-  hints.note("a", "b", start + 30ms, same);
+  hints.note("a", "b", start + 30ms, start + 30ms, same);
   CHECK(hints.guess("a", "b", start + 30ms) == ms(130));
   CHECK(hints.guess("a", "b", start + 50ms) == ms(140));
-  for (int i = 0; i < 10; ++i) hints.note("a", "b", start + 30ms, same);
+  for (int i = 0; i < 10; ++i) hints.note("a", "b", start + 30ms, start + 30ms, same);
   CHECK_FALSE(hints.guess("a", "b", start + 30ms));
-  hints.note("a", "b", start + 30ms, {answer(ms(130), 1), answer(ms(120), 2)});
+  hints.note("a", "b", start + 30ms, start + 30ms, {answer(ms(130), 1), answer(ms(120), 2)});
   CHECK(hints.guess("a", "b", start + 30ms) == ms(120));
   CHECK(hints.guess("a", "b", start + 45ms) == ms(125));
 }
@@ -97,6 +97,17 @@ TEST_CASE("a guess is used only if it is recent, however slow the samples are") 
   };
   CHECK(ask(ms(8980)).answers.size() == 2);
   CHECK(ask(ms(8979)).ask_again == ms(9000));
+}
+
+TEST_CASE("answers that were overtaken do not make the next guess older") {
+  LatestHints hints;
+  const Steady start{};
+  hints.note("a", "b", start + 1ms, start + 2ms, {answer(ms(110), 1), answer(ms(115), 2)});
+  hints.note("a", "b", start, start + 3ms, {answer(ms(100), 1), answer(ms(105), 2)});
+  CHECK(hints.guess("a", "b", start + 3ms) == ms(110));
+  // After a jump of the clock, what was begun later counts.
+  hints.note("a", "b", start + 4ms, start + 5ms, {answer(ms(20), 1), answer(ms(25), 2)});
+  CHECK(hints.guess("a", "b", start + 5ms) == ms(20));
 }
 
 TEST_CASE("no lookup goes back behind an earlier one, or far behind what all have") {
@@ -127,7 +138,7 @@ TEST_CASE("no lookup goes back behind an earlier one, or far behind what all hav
         if (hint && nanoseconds(*hint) <= newest[one]) values.at_hint.values.push_back(along_x(1));
         answers.push_back(std::move(values));
       }
-      hints.note("a", "b", steady, answers);
+      hints.note("a", "b", steady, steady, answers);
       const std::int64_t latest = std::min(newest[0], newest[1]);
       const auto found = one_instant(std::move(answers), hint);
       const std::int64_t answered =
@@ -162,7 +173,7 @@ TEST_CASE("one round trip is enough if samples arrive at constant rates") {
       if (hint && nanoseconds(*hint) <= newest) values.at_hint.values.push_back(along_x(1));
       answers.push_back(std::move(values));
     }
-    hints.note("a", "b", steady, answers);
+    hints.note("a", "b", steady, steady, answers);
     again += one_instant(std::move(answers), hint).ask_again ? 1 : 0;
   }
   CHECK(again <= kLookups / 20);

@@ -87,9 +87,9 @@ TEST_CASE("queries: the clock of a host is known by the stamps of replies") {
   LoopbackNetwork network;
   const ScriptedOwner arm(network, "arm", {{"arm", "", {}}});
   Asker asker(network);
-  CHECK(outcome(asker.queries.clock_difference("leg")) == "unknown_partition");
+  CHECK(outcome(asker.queries.clock_difference("leg", asker.deadline(), 2)) == "unknown_partition");
   // Messages inside a process have none.
-  CHECK(outcome(asker.queries.clock_difference("arm")) == "unsupported");
+  CHECK(outcome(asker.queries.clock_difference("arm", asker.deadline(), 2)) == "unsupported");
 }
 
 }  // namespace tfdude
