@@ -254,6 +254,40 @@ TEST_CASE("The last sample that was observed is a row, until a later one is obse
   CHECK(left_out.correlations[0].observed_with == std::vector<std::string>{"a", "a", "b", "c"});
 }
 
+TEST_CASE("What an observation has corrected is left out once its newest sample is another one") {
+  Random random(659);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  for (int i = 0; i < 4; ++i) REQUIRE(robot.forest.update("a", random.transform(), at(10ms * i)));
+  // A late sighting corrects the sample that it is of, and the last one.
+  const CommonError observed = common_error(random, "observed:1");
+  const Correlation tied{false, {observed}, {"a", "b"}};
+  REQUIRE(robot.forest.revise(
+      {{"a", random.transform(), tied}, {"a", random.transform(), tied, at(30ms)}}, at(10ms),
+      UINT64_MAX));
+  const auto asked = [&] {
+    Query query;
+    query.at = at(10ms);
+    return robot.forest.lookup_segments({{"world", "a"}}, query, std::nullopt, true, Rows::kOfPath)
+        .value();
+  };
+  CHECK_FALSE(asked().correlations[0].unknown);
+  SECTION("its partners are told to forget the edge") {
+    REQUIRE(robot.forest.rewrite("a", {at(25ms), at(35ms)}, {{at(30ms), random.transform()}}));
+  }
+  SECTION("it may come nearer, to those that take part") {
+    REQUIRE(robot.forest.rewrite("a", {at(5ms), at(25ms)}, {{at(10ms), random.transform()}}));
+    Query query;
+    query.at = at(30ms);
+    const auto last =
+        robot.forest.lookup_segments({{"world", "a"}}, query, std::nullopt, true, Rows::kOfPath)
+            .value();
+    CHECK(last.correlations[0].unknown);
+    return;
+  }
+  CHECK(asked().correlations[0].unknown);
+}
+
 TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
   Random random(657);
   INFO("seed " << random.seed());
