@@ -13,22 +13,24 @@
 namespace tfdude {
 namespace {
 
+// Of the sample that a revision is of. @param at  the instant that was observed
+std::int64_t stamp_of(const Revision& revision, std::int64_t at) {
+  return revision.stamp ? nanoseconds(*revision.stamp) : at;
+}
+
 // All revisions of the edge of the first one, by their stamps. One of an instant that comes twice
 // is taken once.
 std::vector<const Revision*> samples_of(const std::vector<Revision>& edges, std::size_t first,
                                         std::int64_t stamp) {
-  const auto stamp_of = [&](const Revision* one) {
-    return one->stamp ? nanoseconds(*one->stamp) : stamp;
-  };
   std::vector<const Revision*> all;
   for (std::size_t i = first; i < edges.size(); ++i) {
     if (edges[i].id == edges[first].id) all.push_back(&edges[i]);
   }
   std::stable_sort(all.begin(), all.end(), [&](const Revision* one, const Revision* other) {
-    return stamp_of(one) < stamp_of(other);
+    return stamp_of(*one, stamp) < stamp_of(*other, stamp);
   });
   const auto same = [&](const Revision* one, const Revision* other) {
-    return stamp_of(one) == stamp_of(other);
+    return stamp_of(*one, stamp) == stamp_of(*other, stamp);
   };
   all.erase(std::unique(all.begin(), all.end(), same), all.end());
   return all;
@@ -152,7 +154,7 @@ void Forest::Impl::leave_out(std::uint32_t slot, const std::vector<const Revisio
   const Sample* row = drifts(edge) || edge.lacks_sample() ? nullptr : last_row(edge);
   if (row == nullptr || !merges(revisions)) return;
   const bool takes_part = std::any_of(revisions.begin(), revisions.end(), [&](const Revision* one) {
-    return (one->stamp ? nanoseconds(*one->stamp) : stamp) == row->stamp;
+    return stamp_of(*one, stamp) == row->stamp;
   });
   if (!takes_part) unlink(edge, row->revision()->correlation().observed_with);
 }
@@ -160,16 +162,13 @@ void Forest::Impl::leave_out(std::uint32_t slot, const std::vector<const Revisio
 // Rows that the revisions leave out are over: what ties the others to them is lost.
 void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
                                   std::int64_t stamp) {
-  const auto stamp_of = [&](const Revision& one) {
-    return one.stamp ? nanoseconds(*one.stamp) : stamp;
-  };
   const HeldVersion& edge = frames_.newest_value(slot);
   const Sample* last = drifts(edge) && edge.samples->count() > 0 ? last_observed(edge) : nullptr;
   const std::int64_t until = last != nullptr ? last->stamp : kAlways;
   std::uint8_t lasts = last != nullptr ? last->revision()->row.lasts : std::uint8_t{0};
   const bool on_path = std::any_of(revisions.begin(), revisions.end(),
                                    [](const Revision* one) { return !one->stamp; });
-  if (stamp_of(*revisions.back()) > until) {
+  if (stamp_of(*revisions.back(), stamp) > until) {
     if (lasts > 0) --lasts;
   } else if (on_path && stamp < until) {
     lasts = std::max(lasts, lasting(1 + observed_since(edge, stamp)));
@@ -178,15 +177,15 @@ void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Re
     const auto& errors = one.correlation.common_errors;
     return !one.correlation.unknown && std::any_of(errors.begin(), errors.end(), is_observed);
   };
-  if (stamp_of(*revisions.front()) > until && last != nullptr &&
+  if (stamp_of(*revisions.front(), stamp) > until && last != nullptr &&
       shares_observation(last->revision()->correlation(), revisions.front()->correlation)) {
-    untie_samples(slot, until, stamp_of(*revisions.front()));
+    untie_samples(slot, until, stamp_of(*revisions.front(), stamp));
   }
   // The latest first: the samples after each row are carried on up to the next one.
   for (std::size_t i = revisions.size(); i-- > 0;) {
-    const std::int64_t at = stamp_of(*revisions[i]);
+    const std::int64_t at = stamp_of(*revisions[i], stamp);
     const bool follows = i > 0 && is_tied(*revisions[i - 1]);
-    const std::int64_t before = follows ? stamp_of(*revisions[i - 1]) : kAlways;
+    const std::int64_t before = follows ? stamp_of(*revisions[i - 1], stamp) : kAlways;
     revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before});
   }
   if (merges(revisions)) {

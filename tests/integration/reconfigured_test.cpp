@@ -65,6 +65,14 @@ struct Arms {
   std::string ready;
 };
 
+// Above hand and head there is one link.
+const char* const kBranchingRobot = R"(<robot name="r">
+  <link name="base"/> <link name="torso"/> <link name="hand"/> <link name="head"/>
+  <joint name="a" type="fixed"><parent link="base"/><child link="torso"/></joint>
+  <joint name="b" type="fixed"><parent link="torso"/><child link="hand"/></joint>
+  <joint name="c" type="fixed"><parent link="torso"/><child link="head"/></joint>
+</robot>)";
+
 }  // namespace
 
 TEST_CASE("reconfigured: a daemon without a configuration restores its whole state") {
@@ -259,12 +267,7 @@ TEST_CASE("reconfigured: --check tells whether several configurations fit togeth
 TEST_CASE("reconfigured: a daemon says who owns the links that it cannot have") {
   const TestDomain domain;
   const TemporaryDirectory directory;
-  const std::string urdf = directory.write("robot.urdf", R"(<robot name="r">
-  <link name="base"/> <link name="torso"/> <link name="hand"/> <link name="head"/>
-  <joint name="a" type="fixed"><parent link="base"/><child link="torso"/></joint>
-  <joint name="b" type="fixed"><parent link="torso"/><child link="hand"/></joint>
-  <joint name="c" type="fixed"><parent link="torso"/><child link="head"/></joint>
-</robot>)");
+  const std::string urdf = directory.write("robot.urdf", kBranchingRobot);
   Process first =
       domain.start_daemon({"--partition", "arm", "--urdf", urdf, "--links", "hand", "--no-state"});
   REQUIRE(!await_ready(first).empty());
@@ -282,12 +285,7 @@ TEST_CASE(
     "reconfigured: what a daemon says to write keeps its links, and has no root without one") {
   const TestDomain domain;
   const TemporaryDirectory directory;
-  const std::string urdf = directory.write("robot.urdf", R"(<robot name="r">
-  <link name="base"/> <link name="torso"/> <link name="hand"/> <link name="head"/>
-  <joint name="a" type="fixed"><parent link="base"/><child link="torso"/></joint>
-  <joint name="b" type="fixed"><parent link="torso"/><child link="hand"/></joint>
-  <joint name="c" type="fixed"><parent link="torso"/><child link="head"/></joint>
-</robot>)");
+  const std::string urdf = directory.write("robot.urdf", kBranchingRobot);
   const auto config = [&](const std::string& links, const std::string& root) {
     return directory.write(
         "body.yaml", "partition: body\nframes: [{id: lamp}]\nurdf:\n  - {file: " + urdf + ", " +
