@@ -182,7 +182,7 @@ struct Stored<std::vector<T>> {
   static py::object save(const std::vector<T>& values) {
     py::list all;
     for (const T& value : values) all.append(saved(value));
-    return std::move(all);
+    return all;
   }
   static std::vector<T> load(py::handle state) {
     std::vector<T> values;
