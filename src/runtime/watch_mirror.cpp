@@ -108,6 +108,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
       values.push_back(std::move(value));
     }
     edges_[i].history = edge.history;
+    edges_[i].commit = edge.commit;
     edges_[i].newest = edge.newest;
     edges_[i].complete = edge.complete;
   }
@@ -127,17 +128,19 @@ std::vector<Time> WatchMirror::stamps(std::string_view id, Time after) const {
   return stamps;
 }
 
-std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedValue entry,
-                                                 bool follows_on) {
-  if (entry.index >= source.edges.size()) return std::nullopt;
+void WatchMirror::admit(const Source& source, PushedValue entry, const Message& message,
+                        Admitted& admitted) {
+  if (entry.index >= source.edges.size()) return;
   entry.index = source.edges[entry.index];
-  if (entry.index >= edges_.size()) return std::nullopt;
+  if (entry.index >= edges_.size()) return;
   Edge& edge = edges_[entry.index];
   const bool begins = entry.history > edge.history;
-  if (entry.history < edge.history || (begins && !entry.process_noise)) return std::nullopt;
+  if (entry.history < edge.history || (begins && !entry.process_noise)) return;
   // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
   // commit.
-  if (!follows_on && !entry.stamp && !entry.cleared) return std::nullopt;
+  if (!message.follows_on && !entry.stamp && !entry.cleared) return;
+  const bool is_stale = !begins && message.commit <= edge.commit;
+  if (is_stale && (!entry.stamp || entry.cleared)) return;
   if (!begins) entry.process_noise.reset();
   if (!begins || entry.continues != edge.history) entry.kept_before.reset();
   // The stamps of another history say nothing about this one: a source's clock may jump back.
@@ -147,7 +150,7 @@ std::optional<PushedValue> WatchMirror::admitted(const Source& source, PushedVal
   }
   edge.history = entry.history;
   if (entry.stamp && (!edge.newest || *entry.stamp > *edge.newest)) edge.newest = entry.stamp;
-  return entry;
+  (is_stale ? admitted.missed : admitted.values).push_back(std::move(entry));
 }
 
 void WatchMirror::note_skipped(const Source& source, const PushedValues& answer) {
@@ -183,18 +186,23 @@ bool WatchMirror::take(const PushedValues& pushed) {
   // Before the first complete values there is nothing that a sample could belong to.
   if (!source.received.answered()) return false;
   if (whole->after == 0 && !is_old) note_skipped(source, *whole);
-  std::vector<PushedValue> values;
+  Admitted admitted;
   for (PushedValue& entry : whole->entries) {
-    if (auto value = admitted(source, std::move(entry), follows_on)) {
-      values.push_back(*std::move(value));
-    }
+    admit(source, std::move(entry), {whole->commit, follows_on}, admitted);
+  }
+  // If something is missing, the same commit may be told again, with more.
+  const std::uint64_t as_of = follows_on ? whole->commit : whole->commit - 1;
+  for (const PushedValue& value : admitted.values) {
+    std::uint64_t& commit = edges_[value.index].commit;
+    commit = std::max(commit, as_of);
   }
   if (!source.received.lacks()) {
     for (const std::uint32_t index : source.edges) {
       if (index < edges_.size()) edges_[index].complete = edges_[index].newest;
     }
   }
-  forest_.take(handles_, values, !is_old);
+  if (!admitted.missed.empty()) forest_.take(handles_, admitted.missed, false);
+  forest_.take(handles_, admitted.values);
   return !is_old;
 }
 

@@ -105,6 +105,7 @@ class WatchMirror {
  private:
   struct Edge {
     std::uint64_t history = 0;     // the owner's number; 0: unknown
+    std::uint64_t commit = 0;      // as of which the owner has told it
     std::optional<Time> newest;    // of its samples
     std::optional<Time> complete;  // up to which none is missing
     std::size_t source = 0;
@@ -114,9 +115,17 @@ class WatchMirror {
     ReceivedGroup received;
   };
 
-  /// The entry to apply, unless it is old or must wait.
-  [[nodiscard]] std::optional<PushedValue> admitted(const Source& source, PushedValue entry,
-                                                    bool follows_on);
+  struct Message {
+    std::uint64_t commit = 0;
+    bool follows_on = false;  // nothing is missing before it
+  };
+  struct Admitted {
+    std::vector<PushedValue> values;
+    std::vector<PushedValue> missed;  // samples of before, unless there is one of their stamp
+  };
+
+  /// Adds the entry, unless it is old or must wait.
+  void admit(const Source& source, PushedValue entry, const Message& message, Admitted& admitted);
   void note_skipped(const Source& source, const PushedValues& answer);
   [[nodiscard]] const Source* source_like(const WatchRoute::Source& source) const;
 

@@ -27,12 +27,22 @@ void spread_correlations(std::vector<PushedValue>& entries) {
   }
 }
 
-std::size_t hash_of(const Transform& X) {
+std::size_t hash_of(const PushedValue& value) {
   std::size_t hash = 0;
-  const auto add = [&hash](double number) { hash = 31 * hash + std::hash<double>()(number); };
-  const Eigen::Matrix4d pose = X.pose.matrix();
+  const auto add = [&hash](const auto& part) {
+    hash = 31 * hash + std::hash<std::decay_t<decltype(part)>>()(part);
+  };
+  const Eigen::Matrix4d pose = value.X.pose.matrix();
   for (const double number : pose.reshaped()) add(number);
-  for (const double number : X.covariance.of_specified().upper()) add(number);
+  for (const double number : value.X.covariance.of_specified().upper()) add(number);
+  const Correlation& correlation = value.correlation;
+  add(correlation.unknown);
+  for (const CommonError& error : correlation.common_errors) {
+    add(error.source);
+    add(error.subtracts);
+    for (const double number : error.loading.reshaped()) add(number);
+  }
+  for (const std::string& partner : correlation.observed_with) add(partner);
   return hash;
 }
 
@@ -193,7 +203,13 @@ void WatchedPartition::carry_over() {
   }
 }
 
-bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, const Message& message,
+std::vector<WatchedPartition::Known::Told>::iterator WatchedPartition::place_of(
+    Time stamp, std::vector<Known::Told>& told) {
+  return std::lower_bound(told.begin(), told.end(), stamp,
+                          [](const Known::Told& one, Time at) { return one.stamp < at; });
+}
+
+bool WatchedPartition::is_news(const PushedValue& entry, Known& known, const Message& message,
                                bool is_late) const {
   const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
                        entry.unsampled == known.unsampled && same(entry.X, known.X) &&
@@ -203,11 +219,11 @@ bool WatchedPartition::is_news(const PushedValue& entry, const Known& known, con
   // Of one commit, a part may be missing.
   if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
   if (entry.cleared && is_old) return false;
-  if (!is_late) return true;
+  if (!is_late) return !is_old || entry.stamp != known.newest;
   if (message.reply ? !missing_from_ : period_.count() != 0) return false;
-  if (known.told.empty()) return true;
-  const Known::Told one{*entry.stamp, hash_of(entry.X)};
-  return !std::binary_search(known.told.begin(), known.told.end(), one);
+  const auto told = place_of(*entry.stamp, known.told);
+  if (told == known.told.end() || told->stamp != *entry.stamp) return true;
+  return told->commit < message.commit && told->hash != hash_of(entry);
 }
 
 bool WatchedPartition::is_pushed_twice() const {
@@ -217,12 +233,11 @@ bool WatchedPartition::is_pushed_twice() const {
 
 void WatchedPartition::forget_told() {
   if (is_pushed_twice()) return;
+  std::optional<Time> again = missing_from_;
+  if (again && asked_from_) again = std::min(*again, *asked_from_);
   for (Known& known : known_) {
     auto& told = known.told;
-    const auto kept =
-        missing_from_ ? std::lower_bound(told.begin(), told.end(), Known::Told{*missing_from_, 0})
-                      : told.end();
-    told.erase(told.begin(), kept);
+    told.erase(told.begin(), again ? place_of(*again, told) : told.end());
   }
 }
 
@@ -248,9 +263,10 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
     known.correlation = entry.correlation;
   }
   if (begins || entry.cleared) known.told.clear();
-  if (entry.stamp && (missing_from_ || is_pushed_twice())) {
-    const Known::Told one{*entry.stamp, hash_of(entry.X)};
-    known.told.insert(std::upper_bound(known.told.begin(), known.told.end(), one), one);
+  if (entry.stamp && (missing_from_ || !answered_ || is_pushed_twice())) {
+    auto told = place_of(*entry.stamp, known.told);
+    if (told == known.told.end() || told->stamp != *entry.stamp) told = known.told.emplace(told);
+    *told = {*entry.stamp, message.commit, hash_of(entry)};
   }
   if (!late) {
     known.history = entry.history;
@@ -333,7 +349,7 @@ std::optional<Time> WatchedPartition::recent() const {
 
 std::optional<Time> WatchedPartition::lacks_from() {
   const Lock lock(mutex_);
-  return missing_from_;
+  return asked_from_ = missing_from_;
 }
 
 std::set<std::uint64_t> WatchedPartition::groups(Clock::time_point now) {

@@ -73,8 +73,12 @@ class WatchedPartition final : public Watched {
     Correlation correlation;  // of its value: of the newest sample alone, or as said
     bool cleared = false;
     bool unsampled = false;
-    using Told = std::pair<Time, std::size_t>;  // a stamp, and the hash of its value
-    std::vector<Told> told;                     // while it may come again; sorted
+    struct Told {
+      Time stamp;
+      std::uint64_t commit = 0;  // as of which it was told
+      std::size_t hash = 0;      // of its value
+    };
+    std::vector<Told> told;  // while it may come again; by stamp, the last of each
   };
   struct PlannedGroup {
     std::uint64_t id = 0;
@@ -106,8 +110,12 @@ class WatchedPartition final : public Watched {
   [[nodiscard]] bool is_pushed_twice() const TFDUDE_REQUIRES(mutex_);
   /// Drops from what was told what does not come again.
   void forget_told() TFDUDE_REQUIRES(mutex_);
-  /// Whether a value of the known history is news.
-  [[nodiscard]] bool is_news(const PushedValue& entry, const Known& known, const Message& message,
+  /// Where what was told of this stamp is, or belongs.
+  [[nodiscard]] static std::vector<Known::Told>::iterator place_of(Time stamp,
+                                                                   std::vector<Known::Told>& told);
+  /// Whether a value of the known history is news. What an earlier commit had at a stamp that was
+  /// told since is none.
+  [[nodiscard]] bool is_news(const PushedValue& entry, Known& known, const Message& message,
                              bool is_late) const TFDUDE_REQUIRES(mutex_);
   // Appends the value if it is news.
   void admit(const Group& group, PushedValue& entry, const Message& message,
@@ -137,6 +145,7 @@ class WatchedPartition final : public Watched {
   std::vector<Group> groups_ TFDUDE_GUARDED_BY(mutex_);
   // Samples were missing from this instant on.
   std::optional<Time> missing_from_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);  // an answer tells what was since
   std::optional<Clock::time_point> answered_ TFDUDE_GUARDED_BY(mutex_);
 };
 

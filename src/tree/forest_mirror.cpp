@@ -137,7 +137,7 @@ void Forest::take(const std::vector<Handle>& edges, const std::vector<PushedValu
   std::vector<bool> correlated(edges.size(), false);
   for (auto value = values.rbegin(); value != values.rend(); ++value) {
     const HeldVersion* edge = edge_of(*value);
-    if (edge == nullptr || correlated[value->index] || is_of_sample(*value)) continue;
+    if (!replace || edge == nullptr || correlated[value->index] || is_of_sample(*value)) continue;
     if (!check_common_errors(value->correlation.common_errors)) continue;
     correlated[value->index] = true;
     const Correlation before =

@@ -9,7 +9,7 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <thread>
+#include <tuple>
 #include <unistd.h>
 #include <vector>
 
@@ -92,6 +92,15 @@ class Recorded {
   bool has(const std::string& frame, Time stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return told_.count({frame, stamp}) > 0;
+  }
+
+  // Whether a sample of each of these frames has come.
+  bool hears(const std::vector<std::string>& moving) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::all_of(moving.begin(), moving.end(), [&](const std::string& frame) {
+      const auto first = told_.lower_bound({frame, Time::min()});
+      return first != told_.end() && first->first == frame;
+    });
   }
 
   void finish() {
@@ -216,16 +225,17 @@ class World {
       default:
         break;
     }
-    for (int i = 0; i < 4; ++i) {
-      const Time at = stamp + std::chrono::milliseconds(250 * i);
-      (void)base_->update("lift", random_value(random_), at);
-      (void)arm_->update({{"elbow", random_value(random_)}}, at);
-      // More than half a turn apart, too.
-      JointValue wrist{"wrist", random_.uniform(-5, 5), 1e-4};
-      if (random_.index(5) == 0) wrist.variance.reset();
-      (void)arm_->update_joints({wrist}, at);
-    }
+    for (int i = 0; i < 4; ++i) sample(stamp + std::chrono::milliseconds(250 * i));
     return late;
+  }
+
+  void sample(Time at) {
+    (void)base_->update("lift", random_value(random_), at);
+    (void)arm_->update({{"elbow", random_value(random_)}}, at);
+    // More than half a turn apart, too.
+    JointValue wrist{"wrist", random_.uniform(-5, 5), 1e-4};
+    if (random_.index(5) == 0) wrist.variance.reset();
+    (void)arm_->update_joints({wrist}, at);
   }
 
   Client& arm() { return *arm_; }
@@ -252,7 +262,14 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
     Recorded recorded(*client, file);
     REQUIRE(eventually([&] { return recorded.has_all(world.arm(), *client); }));
     // Before DDS has matched the readers, first samples may be left out.
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    Time before = step(-8);
+    REQUIRE(eventually([&] {
+      world.sample(before += std::chrono::microseconds(100));
+      return recorded.hears({"lift", "elbow", "wrist"});
+    }));
+    for (const char* moving : {"lift", "elbow", "wrist"}) {
+      REQUIRE(eventually([&] { return recorded.has(moving, before); }));
+    }
     for (int number = 1; number <= kSteps; ++number) {
       recorded.set_time(step(number));
       const auto late = world.change(number);
@@ -336,11 +353,13 @@ class Seeing {
     REQUIRE(node_->correlate("sharing", {false, {{"supply", false, supply}}, {}}));
   }
 
-  void drive(int number) {
+  void drive(int number) { is_at(0.2 * number, step(number)); }
+
+  void is_at(double x, Time at) {
     const Transform X{Pose(), of_deviation(0.1)};
-    for (const char* id : {"plain", "sharing"}) REQUIRE(node_->update(id, X, step(number)));
-    const Pose G = Pose::trusted(Eigen::Quaterniond::Identity(), {0.2 * number, 0, 0});
-    REQUIRE(node_->update("odometry", Transform::exact(G), step(number)));
+    for (const char* id : {"plain", "sharing"}) REQUIRE(node_->update(id, X, at));
+    const Pose G = Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0});
+    REQUIRE(node_->update("odometry", Transform::exact(G), at));
   }
 
   void see(int number) {
@@ -364,6 +383,64 @@ class Seeing {
   std::optional<Node> node_;
 };
 
+bool is_same(const Result<StampedTransform>& found, const Result<StampedTransform>& live) {
+  if (!found || !live) return found.has_value() == live.has_value();
+  return difference(*found, *live) <= 1e-9 && found->basis.sources == live->basis.sources;
+}
+
+// What a watch has told, and when.
+class News {
+ public:
+  explicit News(Client& client)
+      : watch_(client.watch_partition("base", {0, [this](const PartitionNews& news) { add(news); }})
+                   .value()) {}
+
+  void set_time(Time now) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    now_ = now;
+  }
+  // How many samples, and those that an observation has corrected once more.
+  std::size_t count() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return told_.size();
+  }
+  // Whether the samples of this instant have come, of three edges.
+  bool tells(Time stamp) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return 3 <= std::count_if(told_.begin(), told_.end(),
+                              [&](const auto& one) { return std::get<Time>(one) == stamp; });
+  }
+  Recording recorded(const std::string& file, Time end) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::filesystem::remove(file);
+    auto writer = RecordingWriter::create(file, step(0)).value();
+    for (const auto& [news, at] : news_) REQUIRE(writer.add(news, at));
+    REQUIRE(writer.finish(end));
+    auto recording = Recording::open(file).value();
+    recording.seek(end);
+    return recording;
+  }
+
+ private:
+  void add(const PartitionNews& news) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    news_.emplace_back(news, now_);
+    const auto* values = std::get_if<ValuesNews>(&news.what);
+    if (values == nullptr) return;
+    for (const WatchedValue& value : values->values) {
+      if (!value.stamp) continue;
+      told_.emplace(value.frame, false, *value.stamp);
+      if (value.of_sample()) told_.emplace(value.frame, true, *value.stamp);
+    }
+  }
+
+  std::mutex mutex_;
+  Time now_ = step(0);
+  std::vector<std::pair<PartitionNews, Time>> news_;
+  std::set<std::tuple<std::uint32_t, bool, Time>> told_;
+  PartitionWatch watch_;
+};
+
 }  // namespace
 
 TEST_CASE("recording: what was observed is as certain as it was") {
@@ -373,61 +450,45 @@ TEST_CASE("recording: what was observed is as certain as it was") {
   const std::string file = a_file();
   const std::vector<std::string> names{"world", "odometry", "plain", "sharing", "near", "far"};
   constexpr int kSteps = 8;
-  std::vector<Asked> asked;
-  {
-    std::mutex mutex;
-    std::set<std::pair<std::uint32_t, Time>> told;
-    auto writer = RecordingWriter::create(file, step(0)).value();
-    Time now = step(0);
-    const auto watch =
-        client.watch_partition("base", {0, [&](const PartitionNews& news) {
-                                          const std::lock_guard<std::mutex> lock(mutex);
-                                          if (!writer.add(news, now)) std::abort();
-                                          const auto* values = std::get_if<ValuesNews>(&news.what);
-                                          if (values == nullptr) return;
-                                          for (const WatchedValue& value : values->values) {
-                                            if (value.stamp && value.of_sample())
-                                              told.emplace(value.frame, *value.stamp);
-                                            if (value.stamp)
-                                              told.emplace(100 + value.frame, *value.stamp);
-                                          }
-                                        }});
-    REQUIRE(watch);
-    // Before DDS has matched the readers, first samples may be left out.
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    const auto has = [&](std::size_t count) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      return told.size() >= count;
-    };
-    std::size_t count = 0;
-    for (int number = 1; number <= kSteps; ++number) {
-      {
-        const std::lock_guard<std::mutex> lock(mutex);
-        now = step(number);
-      }
-      robot.drive(number);
+  News news(client);
+  // Before DDS has matched the readers, first samples may be left out.
+  Time before = step(-1);
+  REQUIRE(eventually([&] {
+    robot.is_at(0, before += std::chrono::microseconds(50));
+    return news.count() > 0;
+  }));
+  REQUIRE(eventually([&] { return news.tells(before); }));
+  std::size_t count = news.count();
+  for (int number = 1; number <= kSteps; ++number) {
+    news.set_time(step(number));
+    robot.drive(number);
+    count += 3;
+    if (number % 3 == 0) {
+      robot.see(number);
       count += 3;
-      if (number % 3 == 0) {
-        robot.see(number);
-        count += 3;
-      } else if (number > 3) {
-        count += 1;  // of odometry
-      }
-      REQUIRE(eventually([&] { return has(count); }));
+    } else if (number > 3) {
+      count += 1;  // of odometry
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    for (const double at : {2.0, 3.0, 3.4, 4.0, 6.0, 6.7, 7.0, 8.0, 8.5}) {
-      for (const auto& a : names) {
-        for (const auto& b : names) {
-          const Query query = Seeing::when(at);
-          asked.push_back({0, a, b, query, robot.node().lookup(a, b, query)});
-        }
-      }
-    }
-    REQUIRE(writer.finish(step(kSteps + 1)));
+    REQUIRE(eventually([&] { return news.count() >= count; }));
   }
-  auto recording = Recording::open(file).value();
-  recording.seek(step(kSteps + 1));
+  std::vector<Asked> asked;
+  for (const double at : {2.0, 3.0, 3.4, 4.0, 6.0, 6.7, 7.0, 8.0, 8.5}) {
+    for (const auto& a : names) {
+      for (const auto& b : names) {
+        const Query query = Seeing::when(at);
+        asked.push_back({0, a, b, query, robot.node().lookup(a, b, query)});
+      }
+    }
+  }
+  // What was lost comes once more.
+  const auto has_all = [&] {
+    auto recording = news.recorded(file, step(kSteps + 1));
+    return std::all_of(asked.begin(), asked.end(), [&](const Asked& one) {
+      return is_same(recording.lookup(one.a, one.b, one.query), one.live);
+    });
+  };
+  CHECK(eventually(has_all));
+  auto recording = news.recorded(file, step(kSteps + 1));
   for (const Asked& one : asked) {
     INFO(one.a << " to " << one.b << " at " << (*one.query.at - step(0)).count());
     const auto found = recording.lookup(one.a, one.b, one.query);

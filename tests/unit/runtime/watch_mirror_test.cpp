@@ -92,6 +92,35 @@ TEST_CASE("watch mirror: an older reply or push never replaces a newer value") {
   CHECK(watched.mirror.lookup(at(30))->pose.translation().x() == 15);
 }
 
+TEST_CASE("watch mirror: what was told of a stamp, an answer of before does not take back") {
+  Watched watched;
+  WatchMirror& mirror = watched.mirror;
+  const Correlation first{false, {{"first", false, Loading::Ones(6, 1) * 1e-3}}, {}};
+  const Correlation second{false, {{"second", false, Loading::Ones(6, 1) * 1e-3}}, {}};
+  CHECK(mirror.take({kTools, {sample(0, 20, 2, 4, true)}, 0, 9}));
+  // Commit 10 was lost. It has corrected the sample, and so has commit 12.
+  PushedValue corrected = sample(0, 20, 5, 4);
+  corrected.correlation = second;
+  CHECK(mirror.take({kTools, {corrected}, 11, 12}));
+  CHECK(mirror.lookup(at(20))->pose.translation().x() == 16);
+  // The answer was made between both.
+  PushedValue late = sample(0, 10, 1, 4);
+  PushedValue stale = sample(0, 20, 3, 4);
+  stale.correlation = first;
+  CHECK(mirror.take({kTools, {late, stale}, 0, 11}));
+  CHECK(mirror.lookup(at(20))->pose.translation().x() == 16);
+  CHECK(mirror.lookup(at(20))->basis.sources == std::vector<std::string>{"second"});
+  CHECK(mirror.lookup(at(10))->pose.translation().x() == 12);
+  CHECK(mirror.lacks());
+  // The next one has the rest of commit 12.
+  PushedValue whole = sample(0, 20, 6, 4);
+  whole.correlation = first;
+  CHECK(mirror.take({kTools, {late, whole}, 0, 12}));
+  CHECK_FALSE(mirror.lacks());
+  CHECK(mirror.lookup(at(20))->pose.translation().x() == 17);
+  CHECK(mirror.lookup(at(20))->basis.sources == std::vector<std::string>{"first"});
+}
+
 TEST_CASE("watch mirror: after a lost push no half of a commit is visible") {
   Watched watched;
   // A commit of both edges was lost, and one of the edges was written again.

@@ -102,5 +102,33 @@ TEST_CASE("watched partition: samples that two groups push are told once") {
   CHECK(owner.told() == written);
 }
 
+// Answers and pushes come on different ways, and may overtake each other.
+TEST_CASE("watched partition: an answer of before takes nothing back") {
+  WatchedOwner owner;
+  WatchedGroup group = owner.plan();
+  owner.answer(group);
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  REQUIRE(owner.watch.lacks_from() == Time(1s));
+  REQUIRE(owner.forest.update("arm", along_x(1), Time(1s) + 10ms));
+  REQUIRE(owner.forest.update("arm", along_x(2), Time(1s) + 20ms));
+  const PushedValues before = group.snapshot(owner.forest, owner.watch.lacks_from(), true).value();
+  // Two samples are corrected: the newest one, and a late one.
+  Correlation seen{false, {{"observed:1", false, Loading::Ones(6, 1) * 1e-3}}, {"arm", "lamp"}};
+  const auto correct = [&](Time at, double x) {
+    REQUIRE(owner.forest.revise({{"arm", along_x(x), seen}}, at, UINT64_MAX));
+  };
+  correct(Time(1s) + 10ms, 1);
+  correct(Time(1s) + 20ms, 2);
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  CHECK(eventually([&] { return owner.told().size() >= 3; }));
+  const auto told = owner.told();
+  CHECK(told == std::vector<long>{1000, 1010, 1020});
+  (void)owner.watch.take(before, owner.now);
+  REQUIRE(owner.forest.update("arm", along_x(3), Time(1s) + 30ms));
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  CHECK(eventually([&] { return owner.told().size() >= 4; }));
+  CHECK(owner.told() == std::vector<long>{1000, 1010, 1020, 1030});
+}
+
 }  // namespace
 }  // namespace tfdude
