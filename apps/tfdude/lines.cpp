@@ -34,7 +34,8 @@ bool Lines::wait_until_due() {
   if (!pace_) return true;
   const auto now = std::chrono::steady_clock::now();
   const std::chrono::duration<double> left = due_ - now;
-  if (left.count() > 0 && interrupted_within(left.count())) return false;
+  interrupted_ = left.count() > 0 && interrupted_within(left.count());
+  if (interrupted_) return false;
   const auto period = std::chrono::nanoseconds(std::llround(1e9 / *pace_));
   due_ = std::max(due_ + period, now);
   return true;
@@ -46,9 +47,10 @@ bool Lines::fill() {
   while (poll(sources.data(), sources.size(), -1) < 0) {
     if (errno != EINTR) return false;
   }
-  buffer_.erase(0, sources[1].revents == 0 ? at_ : buffer_.size());
+  interrupted_ = sources[1].revents != 0;
+  buffer_.erase(0, interrupted_ ? buffer_.size() : at_);
   at_ = 0;
-  if (sources[1].revents != 0) return false;
+  if (interrupted_) return false;
   std::array<char, 65536> block{};
   const ssize_t size = read(file_.get(), block.data(), block.size());
   if (size <= 0) return false;

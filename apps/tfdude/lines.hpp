@@ -21,6 +21,8 @@ class Lines {
 
   /// The next line, when it is due; nothing at the end.
   [[nodiscard]] std::optional<std::string> next();
+  /// Whether it was an interrupt that ended the lines.
+  [[nodiscard]] bool interrupted() const { return interrupted_; }
   /// The number of the line that next() returned, from 1.
   [[nodiscard]] std::size_t number() const { return number_; }
 
@@ -38,6 +40,7 @@ class Lines {
   std::string buffer_;
   std::size_t at_ = 0;  // the beginning of the next line in the buffer
   bool ended_ = false;
+  bool interrupted_ = false;
   std::size_t number_ = 0;
 };
 

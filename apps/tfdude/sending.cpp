@@ -119,7 +119,8 @@ int SampleLines::send(Client& client, const Common& common, bool acknowledged) c
       reject(sent, *lines, done.error());
     }
   }
-  if (const auto ended = reader.finish(); !ended) reject(sent, *lines, ended.error());
+  const auto ended = lines->interrupted() ? Result<void>() : reader.finish();
+  if (!ended) reject(sent, *lines, ended.error());
   const auto flushed = client.flush(common.options.timeout);
   sent.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   (void)answer(common,

@@ -80,7 +80,14 @@ std::map<std::size_t, std::string> cameras_of(const YAML::Node& root) {
   return cameras;
 }
 
-// T_cam_imu is the pose of the IMU in the camera, T_cn_cnm1 that of the camera before.
+// Whether it is the identity, but for the digits that files are given.
+bool is_near(const Pose& X) {
+  constexpr double kSame = 1e-3;  // [m] and [rad]
+  return X.translation().norm() <= kSame && log(X).tail<3>().norm() <= kSame;
+}
+
+// T_cam_imu is the pose of the IMU in the camera, T_cn_cnm1 that of the camera before. In chains
+// for OpenVINS, T_imu_cam is that of the camera in the IMU.
 class KalibrChain {
  public:
   struct Camera {
@@ -98,15 +105,15 @@ class KalibrChain {
     }
     if (!camera.X_CB) begin(camera);
     if (!camera.X_CI && !camera.X_CB && before_) {
-      return fail(Errc::kInvalidInput, "has neither T_cam_imu nor T_cn_cnm1");
+      return fail(Errc::kInvalidInput, "has neither T_cam_imu, T_imu_cam nor T_cn_cnm1");
     }
     if (camera.X_CB) {
       X_first_ = *camera.X_CB * X_first_;
       if (X_I_) *X_I_ = *camera.X_CB * *X_I_;
     }
     if (camera.X_CI && X_I_ && !is_near(camera.X_CI->inverse() * *X_I_)) {
-      return fail(Errc::kInvalidInput,
-                  "T_cn_cnm1 contradicts T_cam_imu of " + stated_by_ + " and of " + camera.name);
+      return fail(Errc::kInvalidInput, "T_cn_cnm1 contradicts the pose of the IMU of " +
+                                           stated_by_ + " and of " + camera.name);
     }
     place(camera);
     before_ = camera;
@@ -116,11 +123,6 @@ class KalibrChain {
   [[nodiscard]] std::vector<FileEdge> edges() && { return std::move(edges_); }
 
  private:
-  static bool is_near(const Pose& X) {
-    constexpr double kSame = 1e-3;  // [m] and [rad]: more than the digits that files are given
-    return X.translation().norm() <= kSame && log(X).tail<3>().norm() <= kSame;
-  }
-
   void begin(const Camera& camera) {
     first_ = camera;
     X_first_ = Pose();
@@ -164,8 +166,17 @@ FileEdges CalibrationReader::kalibr(const YAML::Node& root) const {
         return std::optional(X);
       });
     };
-    const auto X_CI = pose_at("T_cam_imu");
+    auto X_CI = pose_at("T_cam_imu");
     if (!X_CI) return tl::unexpected(X_CI.error());
+    const auto X_IC = pose_at("T_imu_cam");
+    if (!X_IC) return tl::unexpected(X_IC.error());
+    if (*X_IC) {
+      if (*X_CI && !is_near(**X_CI * **X_IC)) {
+        return error(Errc::kInvalidInput, keys->find("T_imu_cam")->second.mark,
+                     camera + ": T_imu_cam contradicts T_cam_imu");
+      }
+      if (!*X_CI) *X_CI = (*X_IC)->inverse();
+    }
     const auto X_CB = pose_at("T_cn_cnm1");
     if (!X_CB) return tl::unexpected(X_CB.error());
     if (auto ok = chain.add({number, camera, *X_CI, *X_CB, field.mark.line + 1}); !ok) {

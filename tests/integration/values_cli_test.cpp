@@ -4,6 +4,7 @@
 #include <csignal>
 #include <fcntl.h>
 #include <string>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <utility>
@@ -182,6 +183,24 @@ TEST_CASE("values: publishing a pipe ends at an interrupt and tells what was sen
   CHECK(publish.wait(in_time()) == 0);
   close(writer);
   CHECK_THAT(publish.out(), ContainsSubstring("sent         1 lines with 1 values"));
+}
+
+TEST_CASE("values: an interrupt before the first row is no error") {
+  const Robot robot;
+  const std::string pipe = robot.directory.path() + "/pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+  const std::string names = "edge,x,y,z,qx,qy,qz,qw\n";
+  REQUIRE(write(writer, names.data(), names.size()) == static_cast<ssize_t>(names.size()));
+  Process publish = robot.domain.start_cli({"publish", pipe});
+  CHECK(eventually([&] {
+    int left = -1;
+    return ioctl(writer, FIONREAD, &left) == 0 && left == 0;
+  }));
+  publish.signal(SIGINT);
+  CHECK(publish.wait(in_time()) == 0);
+  close(writer);
+  CHECK(publish.err().empty());
 }
 
 TEST_CASE("values: points of one frame are given in another with their covariance") {

@@ -16,7 +16,7 @@
 namespace tfdude {
 
 enum class FrameFormat : std::uint8_t {
-  kKalibr,     ///< a camera chain of Kalibr: T_cam_imu and T_cn_cnm1
+  kKalibr,     ///< a camera chain of Kalibr: T_cam_imu or T_imu_cam, and T_cn_cnm1
   kEyeOnHand,  ///< easy_handeye and easy_handeye2, a camera on the robot's hand
   kEyeOnBase,  ///< the same, a camera beside the robot
   kRos1,       ///< static_transform_publisher in a launch file of ROS 1

@@ -226,6 +226,21 @@ TEST_CASE("frame file: a camera chain closes within 1 mm and 1 mrad") {
   CHECK_THAT(refusal(chain(0.0008, 0.0008)), ContainsSubstring("contradicts"));
 }
 
+TEST_CASE("frame file: the camera in the IMU is read, as OpenVINS writes it") {
+  const std::string in_camera = "T_cam_imu: [0,-1,0,1, 1,0,0,2, 0,0,1,3, 0,0,0,1]";
+  const std::string in_imu = "T_imu_cam: [0,1,0,-2, -1,0,0,1, 0,0,1,-3, 0,0,0,1]";
+  const auto frames = parsed("cam0: {" + in_imu + "}\n");
+  REQUIRE(frames);
+  const Pose& X_IC = (*frames)[0].X_PC.pose;
+  CHECK((X_IC.translation() - Eigen::Vector3d(-2, 1, -3)).norm() < 1e-12);
+  CHECK((X_IC.rotation() * Eigen::Vector3d::UnitX() - -Eigen::Vector3d::UnitY()).norm() < 1e-12);
+  CHECK(parsed("cam0: {" + in_camera + ", " + in_imu + "}\n"));
+  CHECK(refusal("cam0: {" + in_camera + ", T_imu_cam: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n") ==
+        "file:1: cam0: T_imu_cam contradicts T_cam_imu");
+  CHECK(edges_of("cam0: {" + in_imu + "}\ncam1: {" + in_imu +
+                 ", T_cn_cnm1: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n") == "imu0>cam0 imu0>cam1 ");
+}
+
 TEST_CASE("frame file: of COLMAP only images.txt is read, and each image once") {
   const std::string image = "1 1 0 0 0 1 2 3 1 p.jpg\n\n";
   CHECK(edges_of(image) == "world>p.jpg ");
