@@ -109,10 +109,15 @@ void WatchMirror::inherit(const WatchMirror& before) {
     }
     edges_[i].history = edge.history;
     edges_[i].commit = edge.commit;
+    edges_[i].answered = edge.answered;
+    edges_[i].answered_from = edge.answered_from;
     edges_[i].newest = edge.newest;
     edges_[i].complete = edge.complete;
   }
   forest_.take(handles_, values);
+  if (before.skipped_from_) {
+    skipped_from_ = std::min(skipped_from_.value_or(*before.skipped_from_), *before.skipped_from_);
+  }
 }
 
 std::vector<Time> WatchMirror::stamps(std::string_view id, Time after) const {
@@ -139,7 +144,10 @@ void WatchMirror::admit(const Source& source, PushedValue entry, const Message& 
   // A sample gives the edge's value at its stamp. But a value without a stamp may be half of a
   // commit.
   if (!message.follows_on && !entry.stamp && !entry.cleared) return;
-  const bool is_stale = !begins && message.commit <= edge.commit;
+  const bool is_told =
+      message.commit <= edge.commit ||
+      (message.commit <= edge.answered && (!entry.stamp || *entry.stamp >= edge.answered_from));
+  const bool is_stale = !begins && is_told;
   if (is_stale && (!entry.stamp || entry.cleared)) return;
   if (!begins) entry.process_noise.reset();
   if (!begins || entry.continues != edge.history) entry.kept_before.reset();
@@ -167,6 +175,24 @@ void WatchMirror::note_skipped(const Source& source, const PushedValues& answer)
   }
 }
 
+void WatchMirror::note_told(const PushedValues& message, bool follows_on,
+                            const std::vector<PushedValue>& values) {
+  const bool is_answer = message.after == 0;
+  for (const PushedValue& value : values) {
+    Edge& edge = edges_[value.index];
+    if (!is_answer) {
+      // If something is missing, the same commit may be told again, with more.
+      const std::uint64_t more = follows_on || message.commit == 0 ? 0 : 1;
+      edge.commit = std::max(edge.commit, message.commit - more);
+    } else if (message.commit > edge.answered) {
+      edge.answered = message.commit;
+      edge.answered_from = value.stamp.value_or(Time::min());
+    } else if (message.commit == edge.answered && value.stamp) {
+      edge.answered_from = std::min(edge.answered_from, *value.stamp);
+    }
+  }
+}
+
 bool WatchMirror::has(std::uint64_t group) const {
   return std::any_of(route_.sources.begin(), route_.sources.end(),
                      [&](const WatchRoute::Source& source) { return source.group == group; });
@@ -190,12 +216,7 @@ bool WatchMirror::take(const PushedValues& pushed) {
   for (PushedValue& entry : whole->entries) {
     admit(source, std::move(entry), {whole->commit, follows_on}, admitted);
   }
-  // If something is missing, the same commit may be told again, with more.
-  const std::uint64_t as_of = follows_on ? whole->commit : whole->commit - 1;
-  for (const PushedValue& value : admitted.values) {
-    std::uint64_t& commit = edges_[value.index].commit;
-    commit = std::max(commit, as_of);
-  }
+  note_told(*whole, follows_on, admitted.values);
   if (!source.received.lacks()) {
     for (const std::uint32_t index : source.edges) {
       if (index < edges_.size()) edges_[index].complete = edges_[index].newest;

@@ -104,8 +104,10 @@ class WatchMirror {
 
  private:
   struct Edge {
-    std::uint64_t history = 0;     // the owner's number; 0: unknown
-    std::uint64_t commit = 0;      // as of which the owner has told it
+    std::uint64_t history = 0;   // the owner's number; 0: unknown
+    std::uint64_t commit = 0;    // as of which pushes have told it
+    std::uint64_t answered = 0;  // as of which an answer has, from that stamp on:
+    Time answered_from;
     std::optional<Time> newest;    // of its samples
     std::optional<Time> complete;  // up to which none is missing
     std::size_t source = 0;
@@ -127,6 +129,8 @@ class WatchMirror {
   /// Adds the entry, unless it is old or must wait.
   void admit(const Source& source, PushedValue entry, const Message& message, Admitted& admitted);
   void note_skipped(const Source& source, const PushedValues& answer);
+  void note_told(const PushedValues& message, bool follows_on,
+                 const std::vector<PushedValue>& values);
   [[nodiscard]] const Source* source_like(const WatchRoute::Source& source) const;
 
   WatchRoute route_;

@@ -1,7 +1,6 @@
 #include "runtime/watched_partition.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <utility>
 
@@ -25,25 +24,6 @@ void spread_correlations(std::vector<PushedValue>& entries) {
     const auto [known, is_last] = last.emplace(entry->index, &entry->correlation);
     if (!is_last) entry->correlation = *known->second;
   }
-}
-
-std::size_t hash_of(const PushedValue& value) {
-  std::size_t hash = 0;
-  const auto add = [&hash](const auto& part) {
-    hash = 31 * hash + std::hash<std::decay_t<decltype(part)>>()(part);
-  };
-  const Eigen::Matrix4d pose = value.X.pose.matrix();
-  for (const double number : pose.reshaped()) add(number);
-  for (const double number : value.X.covariance.of_specified().upper()) add(number);
-  const Correlation& correlation = value.correlation;
-  add(correlation.unknown);
-  for (const CommonError& error : correlation.common_errors) {
-    add(error.source);
-    add(error.subtracts);
-    for (const double number : error.loading.reshaped()) add(number);
-  }
-  for (const std::string& partner : correlation.observed_with) add(partner);
-  return hash;
 }
 
 // For each frame of `from` its index in `to`, if it has the same parent there.
@@ -170,7 +150,9 @@ bool WatchedPartition::take_over() {
   carry_over();
   incarnation_ = planned_.incarnation;
   answered_.reset();
-  missing_from_ = recent();
+  skipped_from_.reset();
+  missing_from_.reset();
+  misses_recent();
   if (new_frames) post({name_, FramesNews{frames_, incarnation_}});
   return true;
 }
@@ -203,27 +185,22 @@ void WatchedPartition::carry_over() {
   }
 }
 
-std::vector<WatchedPartition::Known::Told>::iterator WatchedPartition::place_of(
-    Time stamp, std::vector<Known::Told>& told) {
-  return std::lower_bound(told.begin(), told.end(), stamp,
-                          [](const Known::Told& one, Time at) { return one.stamp < at; });
-}
-
 bool WatchedPartition::is_news(const PushedValue& entry, Known& known, const Message& message,
                                bool is_late) const {
   const bool repeats = entry.stamp == known.newest && entry.cleared == known.cleared &&
                        entry.unsampled == known.unsampled && same(entry.X, known.X) &&
                        entry.correlation == known.correlation;
-  if (repeats) return false;
   const bool is_old = message.commit <= known.commit;
+  if (repeats) {
+    known.commit = std::max(known.commit, message.commit);
+    return false;
+  }
   // Of one commit, a part may be missing.
   if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
   if (entry.cleared && is_old) return false;
   if (!is_late) return !is_old || entry.stamp != known.newest;
   if (message.reply ? !missing_from_ : period_.count() != 0) return false;
-  const auto told = place_of(*entry.stamp, known.told);
-  if (told == known.told.end() || told->stamp != *entry.stamp) return true;
-  return told->commit < message.commit && told->hash != hash_of(entry);
+  return known.told.is_news(entry, message.commit, message.reply);
 }
 
 bool WatchedPartition::is_pushed_twice() const {
@@ -235,10 +212,38 @@ void WatchedPartition::forget_told() {
   if (is_pushed_twice()) return;
   std::optional<Time> again = missing_from_;
   if (again && asked_from_) again = std::min(*again, *asked_from_);
+  for (Known& known : known_) known.told.keep_from(again);
+}
+
+void WatchedPartition::misses(Time from) {
+  missing_from_ = std::min(missing_from_.value_or(from), from);
   for (Known& known : known_) {
-    auto& told = known.told;
-    told.erase(told.begin(), again ? place_of(*again, told) : told.end());
+    if (!known.newest || !known.told.empty()) continue;
+    known.told.add(*known.newest, known.commit, known.X, known.correlation);
   }
+}
+
+void WatchedPartition::misses_recent() {
+  if (missing_from_) return;
+  if (const auto from = recent()) misses(*from);
+}
+
+void WatchedPartition::note_skipped(const Group& group, const PushedValues& answer) {
+  std::vector<bool> seen(group.frames.size(), false);
+  for (const PushedValue& entry : answer.entries) {
+    if (entry.index >= seen.size() || seen[entry.index] || !entry.stamp) continue;
+    seen[entry.index] = true;  // its first sample
+    if (group.frames[entry.index] == kGone) continue;
+    const Known& known = known_[group.frames[entry.index]];
+    if (!known.newest || entry.history != known.history || *entry.stamp <= *known.newest) continue;
+    skipped_from_ = std::min(skipped_from_.value_or(*known.newest), *known.newest);
+  }
+  if (skipped_from_) misses(*skipped_from_);
+}
+
+void WatchedPartition::on_told_from(Time from) {
+  const Lock lock(mutex_);
+  if (skipped_from_ && from <= *skipped_from_) skipped_from_.reset();
 }
 
 void WatchedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
@@ -264,9 +269,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
   }
   if (begins || entry.cleared) known.told.clear();
   if (entry.stamp && (missing_from_ || !answered_ || is_pushed_twice())) {
-    auto told = place_of(*entry.stamp, known.told);
-    if (told == known.told.end() || told->stamp != *entry.stamp) told = known.told.emplace(told);
-    *told = {*entry.stamp, message.commit, hash_of(entry)};
+    known.told.add(*entry.stamp, message.commit, entry.X, entry.correlation);
   }
   if (!late) {
     known.history = entry.history;
@@ -298,22 +301,23 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (!whole) return false;
   if (*waiting_ + whole->entries.size() > kMostWaiting && *waiting_ > 0) {
     group->received.skip(*whole);
-    if (!missing_from_) missing_from_ = recent();
+    misses_recent();
     return true;
   }
-  const bool follows_on = group->received.place(*whole).follows_on;
+  const auto [is_old, follows_on] = group->received.place(*whole);
   const Message message{whole->after == 0, follows_on, whole->commit};
-  if (!message.follows_on && !missing_from_) missing_from_ = recent();
+  if (!message.follows_on) misses_recent();
+  if (message.reply && !is_old && period_.count() == 0) note_skipped(*group, *whole);
   if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
   ValuesNews news{whole->commit, {}};
   news.values.reserve(whole->entries.size());
   for (PushedValue& entry : whole->entries) admit(*group, entry, message, news.values);
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
-  if (lacks_any()) return true;
+  if (lacks_any() || skipped_from_) return true;
   if (!missing_from_ && !settles(now)) return false;
   missing_from_.reset();
-  if (settles(now)) missing_from_ = recent();
+  if (settles(now)) misses_recent();
   forget_told();
   return false;
 }
@@ -329,7 +333,7 @@ bool WatchedPartition::settles(Clock::time_point now) const {
 
 bool WatchedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
-  return lacks_any() || settles(now);
+  return lacks_any() || skipped_from_ || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.

@@ -17,6 +17,7 @@
 #include "base/mutex.hpp"
 #include "partition/watching.hpp"
 #include "runtime/callbacks.hpp"
+#include "runtime/told_samples.hpp"
 #include "runtime/watched.hpp"
 
 namespace tfdude {
@@ -58,6 +59,7 @@ class WatchedPartition final : public Watched {
   /// Also because DDS may not have matched the readers yet.
   [[nodiscard]] bool lacks(Clock::time_point now) const override;
   [[nodiscard]] std::optional<Time> lacks_from() override;
+  void on_told_from(Time from) override;
   /// The groups of the plan before end here.
   [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
   /// A reply has all values of the partition.
@@ -73,12 +75,7 @@ class WatchedPartition final : public Watched {
     Correlation correlation;  // of its value: of the newest sample alone, or as said
     bool cleared = false;
     bool unsampled = false;
-    struct Told {
-      Time stamp;
-      std::uint64_t commit = 0;  // as of which it was told
-      std::size_t hash = 0;      // of its value
-    };
-    std::vector<Told> told;  // while it may come again; by stamp, the last of each
+    ToldSamples told;
   };
   struct PlannedGroup {
     std::uint64_t id = 0;
@@ -108,11 +105,14 @@ class WatchedPartition final : public Watched {
   /// Whether groups of the plan before are still pushed, too: each message of them may have several
   /// samples that were told.
   [[nodiscard]] bool is_pushed_twice() const TFDUDE_REQUIRES(mutex_);
+  /// Samples from this instant on may come again, or for the first time.
+  void misses(Time from) TFDUDE_REQUIRES(mutex_);
+  void misses_recent() TFDUDE_REQUIRES(mutex_);
+  /// An answer tells only the newest samples, unless it is asked for more. If pushes were lost
+  /// before it, those between are missing.
+  void note_skipped(const Group& group, const PushedValues& answer) TFDUDE_REQUIRES(mutex_);
   /// Drops from what was told what does not come again.
   void forget_told() TFDUDE_REQUIRES(mutex_);
-  /// Where what was told of this stamp is, or belongs.
-  [[nodiscard]] static std::vector<Known::Told>::iterator place_of(Time stamp,
-                                                                   std::vector<Known::Told>& told);
   /// Whether a value of the known history is news. What an earlier commit had at a stamp that was
   /// told since is none.
   [[nodiscard]] bool is_news(const PushedValue& entry, Known& known, const Message& message,
@@ -145,7 +145,8 @@ class WatchedPartition final : public Watched {
   std::vector<Group> groups_ TFDUDE_GUARDED_BY(mutex_);
   // Samples were missing from this instant on.
   std::optional<Time> missing_from_ TFDUDE_GUARDED_BY(mutex_);
-  std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);  // an answer tells what was since
+  std::optional<Time> skipped_from_ TFDUDE_GUARDED_BY(mutex_);  // samples after it are missing
+  std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);    // an answer tells what was since
   std::optional<Clock::time_point> answered_ TFDUDE_GUARDED_BY(mutex_);
 };
 

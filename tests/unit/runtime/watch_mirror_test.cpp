@@ -121,6 +121,32 @@ TEST_CASE("watch mirror: what was told of a stamp, an answer of before does not 
   CHECK(mirror.lookup(at(20))->basis.sources == std::vector<std::string>{"first"});
 }
 
+TEST_CASE("watch mirror: an answer tells nothing of earlier samples than it has") {
+  const auto x = [](const WatchMirror& mirror, std::int64_t t) {
+    return mirror.lookup(at(t))->pose.translation().x() - 11;
+  };
+  SECTION("the push that corrected one was lost") {
+    Watched watched;
+    WatchMirror& mirror = watched.mirror;
+    CHECK(mirror.take({kTools, {sample(0, 10, 1, 4, true), sample(0, 20, 2, 4)}, 0, 9}));
+    mirror.told_from(Time());
+    CHECK(mirror.take({kTools, {sample(0, 30, 3, 4)}, 10, 11}));
+    CHECK(mirror.take({kTools, {sample(0, 30, 3, 4)}, 0, 11}));
+    CHECK(mirror.skipped_from() == ms(20));
+    (void)mirror.take({kTools, {sample(0, 20, 5, 4), sample(0, 30, 3, 4)}, 0, 11});
+    CHECK(x(mirror, 20) == 5);
+  }
+  SECTION("it overtakes the push") {
+    Watched watched;
+    WatchMirror& mirror = watched.mirror;
+    CHECK(mirror.take({kTools, {sample(0, 10, 1, 4, true), sample(0, 20, 2, 4)}, 0, 9}));
+    CHECK(mirror.take({kTools, {sample(0, 20, 2, 4)}, 0, 12}));
+    (void)mirror.take({kTools, {sample(0, 10, 5, 4), sample(0, 20, 7, 4)}, 9, 11});
+    CHECK(x(mirror, 10) == 5);
+    CHECK(x(mirror, 20) == 2);
+  }
+}
+
 TEST_CASE("watch mirror: after a lost push no half of a commit is visible") {
   Watched watched;
   // A commit of both edges was lost, and one of the edges was written again.

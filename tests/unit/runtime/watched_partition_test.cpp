@@ -1,7 +1,9 @@
 #include "runtime/watched_partition.hpp"
 
 #include <chrono>
+#include <map>
 #include <mutex>
+#include <utility>
 #include <vector>
 
 #include "base/loop.hpp"
@@ -45,23 +47,33 @@ struct WatchedOwner {
     return stamps;
   }
 
+  // What was told last.
+  double told_at(std::uint32_t frame, long stamp) {
+    const std::lock_guard lock(mutex);
+    return values_at.at({frame, stamp});
+  }
+
   Forest forest;
   Directory directory{forest, "arm"};
   Watched::Clock::time_point now{1h};
   std::mutex mutex;
   std::vector<long> stamps;
+  std::map<std::pair<std::uint32_t, long>, double> values_at;  // by frame and stamp [ms]
   Loop loop{"test"};
   Callbacks callbacks{loop};
-  WatchedPartition watch{"arm", 0,
-                         [this](const PartitionNews& news) {
-                           const auto* values = std::get_if<ValuesNews>(&news.what);
-                           if (values == nullptr) return;
-                           const std::lock_guard lock(mutex);
-                           for (const WatchedValue& value : values->values) {
-                             if (value.stamp) stamps.push_back(ms(*value.stamp));
-                           }
-                         },
-                         callbacks.line()};
+  WatchedPartition watch{
+      "arm", 0,
+      [this](const PartitionNews& news) {
+        const auto* values = std::get_if<ValuesNews>(&news.what);
+        if (values == nullptr) return;
+        const std::lock_guard lock(mutex);
+        for (const WatchedValue& value : values->values) {
+          if (!value.stamp) continue;
+          stamps.push_back(ms(*value.stamp));
+          values_at[{value.frame, ms(*value.stamp)}] = value.X_PC.pose.translation().x();
+        }
+      },
+      callbacks.line()};
 };
 
 // While the frames change, the groups before and after are both pushed. If the machine is busy, a
@@ -128,6 +140,56 @@ TEST_CASE("watched partition: an answer of before takes nothing back") {
   (void)owner.watch.take(group.next_push(owner.forest), owner.now);
   CHECK(eventually([&] { return owner.told().size() >= 4; }));
   CHECK(owner.told() == std::vector<long>{1000, 1010, 1020, 1030});
+}
+
+TEST_CASE("watched partition: what an answer shows to be lost is asked for") {
+  WatchedOwner owner;
+  WatchedGroup group = owner.plan();
+  owner.answer(group);
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  (void)owner.watch.groups(owner.now);
+  owner.now += WatchedPartition::kSettle + 100ms;
+  REQUIRE(owner.forest.update("arm", along_x(1), Time(1s) + 5ms));
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  REQUIRE_FALSE(owner.watch.lacks(owner.now));
+  for (const auto at : {10ms, 20ms}) {
+    REQUIRE(owner.forest.update("arm", along_x(1), Time(1s) + at));
+    (void)group.next_push(owner.forest);  // lost
+  }
+  owner.answer(group);
+  CHECK(owner.watch.lacks(owner.now));
+  const std::optional<Time> from = owner.watch.lacks_from();
+  REQUIRE(from == Time(1s) + 5ms);
+  owner.answer(group);
+  owner.watch.on_told_from(*from);
+  CHECK_FALSE(owner.watch.lacks(owner.now));
+  CHECK(eventually([&] { return owner.told().size() >= 4; }));
+  CHECK(owner.told() == std::vector<long>{1000, 1005, 1020, 1010});
+}
+
+TEST_CASE("watched partition: an answer brings no earlier value of a sample back") {
+  WatchedOwner owner;
+  REQUIRE(owner.forest.add("tool", "arm", along_x(0)));
+  REQUIRE(owner.forest.update("arm", along_x(1), Time(1s) + 20ms));
+  REQUIRE(owner.forest.update("tool", along_x(1), Time(1s) + 18ms));
+  REQUIRE(owner.forest.update("tool", along_x(1), Time(1s) + 28ms));
+  constexpr std::uint32_t kTool = 2;
+  WatchedGroup group = owner.plan();
+  owner.answer(group);
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  // It has the tool's last sample of before, too.
+  REQUIRE(owner.watch.lacks_from() == Time(1s) + 20ms);
+  const PushedValues before = group.snapshot(owner.forest, Time(1s) + 20ms, true).value();
+  REQUIRE(owner.forest.revise({{"tool", along_x(2), {}}}, Time(1s) + 18ms, UINT64_MAX));
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  (void)owner.watch.take(before, owner.now);
+  REQUIRE(owner.forest.update("arm", along_x(3), Time(1s) + 30ms));
+  (void)owner.watch.take(group.next_push(owner.forest), owner.now);
+  REQUIRE(eventually([&] {
+    const auto told = owner.told();
+    return !told.empty() && told.back() == 1030;
+  }));
+  CHECK(owner.told_at(kTool, 1018) == 2);
 }
 
 }  // namespace
