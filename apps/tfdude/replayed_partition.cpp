@@ -143,8 +143,12 @@ Result<void> ReplayedPartition::flush() {
   if (updated.error().code == Errc::kPartitionTaken) return updated;
   // One that is rejected does not hold up the others.
   for (const EdgeUpdate& edge : batch) {
-    const auto one = node_.update(edge.id, edge.X_PC, stamp_);
-    if (!one && one.error().code != Errc::kStampTaken) ++rejected_;
+    auto one = node_.update(edge.id, edge.X_PC, stamp_);
+    // An observation has corrected the sample.
+    if (!one && one.error().code == Errc::kStampTaken) {
+      one = node_.rewrite(edge.id, {*stamp_, *stamp_}, {{*stamp_, edge.X_PC}});
+    }
+    if (!one) ++rejected_;
   }
   return {};
 }

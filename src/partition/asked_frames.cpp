@@ -34,15 +34,22 @@ FramesRequest AskedFrames::request(std::vector<std::string> ids,
 // Each frame comes after its parent, so none gets a parent that is still below it here.
 void AskedFrames::take(const FramesRequest& request, const std::vector<KnownFrame>& answer,
                        Steady asked) {
+  // Answers come in any order.
+  const auto is_newer_here = [&](const std::string& id) {
+    const auto known = as_of_.find(id);
+    return known != as_of_.end() && known->second > asked;
+  };
   std::unordered_set<std::string_view> there;
   for (const KnownFrame& frame : answer) {
-    if (!frame.parent.empty() && there.count(frame.parent) == 0) drop(frame.parent);
+    const bool lacks_parent = !frame.parent.empty() && there.count(frame.parent) == 0;
+    if (lacks_parent && !is_newer_here(frame.parent)) drop(frame.parent);
     there.insert(frame.id);
+    if (is_newer_here(frame.id)) continue;
     (void)forest_.put_remote(frame.id, frame.parent, directory_.refer_to(frame.partition));
     as_of_[frame.id] = asked;
   }
   for (const std::string& id : request.ids) {
-    if (there.count(id) == 0) drop(id);
+    if (there.count(id) == 0 && !is_newer_here(id)) drop(id);
   }
 }
 

@@ -172,7 +172,7 @@ void WatchRounds::answered(Clock::time_point now) {
     // An owner that has restarted since the plan has other groups.
     if (pushed != nullptr && pushed->group == groups_[i].id) {
       (void)watched.take(*pushed, now);
-      // It leaves edges out if a push that tells of them is on its way.
+      // An answer leaves edges out if a push that tells of them is on its way.
       whole = whole && pushed->after == 0;
       continue;
     }

@@ -62,6 +62,8 @@ std::string written(const TemporaryDirectory& directory) {
     REQUIRE(writer->add("arm", {wrist}, at(time)));
     add("base",
         ValuesNews{1U + static_cast<unsigned>(i), {{0, at(time), shifted(0.001 * i, 0.01)}}}, time);
+    // An observation has corrected the sample.
+    if (i == 300) add("base", ValuesNews{301, {{0, at(time), shifted(0.31, 0.004)}}}, time + 0.005);
     if (i != 500) continue;
     add("arm", FramesNews{{{"hand", "lift"}, {"tool", "hand"}}, 6}, time);
     add("arm", ValuesNews{2, {{1, std::nullopt, shifted(0.5, 0.005), {}, Covariance()}}}, time);
@@ -108,6 +110,11 @@ TEST_CASE("replay: the partitions are served as they were recorded, at the recor
   query.at = at(kBegin + 4.005);
   check_same(client->lookup("world", "hand", query, 20s),
              recording->lookup_at("world", "hand", *query.at, query));
+  query.at = at(kBegin + 3);
+  recording->seek(at(kBegin + 4));
+  const auto corrected = recording->lookup("world", "lift", query);
+  CHECK(corrected.value().pose.translation().x() == 0.31);
+  check_same(client->lookup("world", "lift", query), corrected);
   const auto now = client->now();
   REQUIRE(now);
   CHECK(*now >= at(kBegin + 4));

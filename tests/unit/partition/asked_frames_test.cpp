@@ -147,6 +147,16 @@ TEST_CASE("asked frames: a later answer replaces owners and parents, and drops w
   CHECK(asker.structure().empty());
 }
 
+TEST_CASE("asked frames: an answer to an earlier question undoes nothing") {
+  Asker asker;
+  asker.take({"hand"}, {{"leg", "", "legs"}, {"hand", "leg", "legs"}}, kLater);
+  asker.take({"hand"}, {{"arm", "", "arms"}, {"hand", "arm", "arms"}}, kOnce);
+  const Lines newest{"arm <  @ arms", "hand < leg @ legs, attached", "leg <  @ legs"};
+  CHECK(asker.structure() == newest);
+  asker.take({"hand", "leg"}, {}, kOnce);
+  CHECK(asker.structure() == newest);
+}
+
 TEST_CASE("asked frames: frames that changed places make no cycle") {
   Asker asker;
   asker.take({"c"}, {{"a", "", "arms"}, {"b", "a", "arms"}, {"c", "b", "arms"}});

@@ -177,7 +177,7 @@ TEST_CASE("watched partition: an answer brings no earlier value of a sample back
   WatchedGroup group = owner.plan();
   owner.answer(group);
   (void)owner.watch.take(group.next_push(owner.forest), owner.now);
-  // It has the tool's last sample of before, too.
+  // The answer has the tool's last sample of before, too.
   REQUIRE(owner.watch.lacks_from() == Time(1s) + 20ms);
   const PushedValues before = group.snapshot(owner.forest, Time(1s) + 20ms, true).value();
   REQUIRE(owner.forest.revise({{"tool", along_x(2), {}}}, Time(1s) + 18ms, UINT64_MAX));
