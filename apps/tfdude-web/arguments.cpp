@@ -33,6 +33,10 @@ std::optional<int> read_arguments(int argc, char** argv, Settings& settings) {
   app.add_option("--packages", settings.packages,
                  "folder of packages, in which the URDF's meshes are found; may be repeated")
       ->allow_extra_args(false);
+  app.add_option("--max-recording", settings.most_recording,
+                 "largest recording that may be dropped on the page [MiB]; 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1 << 20));
   cli::add_network_options(app, settings.options);
   cli::add_clock_option(app, [&](ClockKind kind) { settings.options.clock = kind; });
   return cli::read_command_line(app, argc, argv);

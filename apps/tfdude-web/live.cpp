@@ -5,6 +5,7 @@
 
 #include "../rendering/json.hpp"
 #include "../rendering/quantities.hpp"
+#include "told.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -148,18 +149,13 @@ void Live::note_rejected(const std::string& partition, const HistoryInfo& histor
 }
 
 void Live::add_event(const Change& change) {
-  const bool bad = change.kind == ChangeKind::kPartitionDown ||
-                   change.kind == ChangeKind::kConflict ||
-                   change.kind == ChangeKind::kJointConflict ||
-                   change.kind == ChangeKind::kFrameOrphaned || change.kind == ChangeKind::kMissed;
-  add_event({0, change.time, bad ? "warning" : "info", cli::change_json(change)});
+  add_event({0, change.time, level_of(change.kind), cli::change_json(change)});
 }
 
 void Live::add_event(Event event) {
   const std::lock_guard<std::mutex> lock(mutex_);
   event.number = ++last_event_;
-  event.json["time_ns"] = std::to_string(nanoseconds(event.time));
-  event.json["level"] = event.level;
+  event.json = event_json(std::move(event.json), event.time, event.level);
   events_.push_back(std::move(event));
   if (events_.size() > kKeptEvents) events_.pop_front();
 }

@@ -3,7 +3,9 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <random>
+#include <string_view>
 
 #include <spdlog/spdlog.h>
 
@@ -12,6 +14,8 @@
 #include "live.hpp"
 #include "meshes.hpp"
 #include "page_talk.hpp"
+#include "reader_process.hpp"
+#include "recordings.hpp"
 #include "settings.hpp"
 #include "site.hpp"
 
@@ -65,8 +69,8 @@ bool is_loopback(const std::string& address) {
   return address.rfind("127.", 0) == 0 || address == "::1";
 }
 
-web::Site make_site(web::Live& live, const Files& files, const Access& access,
-                    const web::Post& post) {
+web::Site make_site(web::Live& live, web::Recordings& recordings, const Files& files,
+                    const Access& access, const web::Post& post) {
   web::Site site;
   site.get = [&files, access](const web::Request& request) {
     if (const auto reply = web::reject(access, request)) return *reply;
@@ -77,7 +81,7 @@ web::Site make_site(web::Live& live, const Files& files, const Access& access,
     }
     return reply;
   };
-  site.accept = [&live, access,
+  site.accept = [&live, &recordings, access,
                  post](const web::Request& request) -> tl::expected<web::Accepted, web::Reply> {
     if (auto reply = web::reject(access, request)) return tl::unexpected(*reply);
     std::vector<std::string> known = web::kFoxgloveProtocols;
@@ -89,10 +93,14 @@ web::Site make_site(web::Live& live, const Files& files, const Access& access,
       reply.body = std::make_shared<const std::string>("no known subprotocol is offered\n");
       return tl::unexpected(reply);
     }
-    return web::Accepted{protocol, protocol == web::kPageProtocol ? web::talk_to_page(live, post)
-                                                                  : web::talk_to_foxglove(live)};
+    return web::Accepted{protocol, protocol == web::kPageProtocol
+                                       ? web::talk_to_page(live, recordings, post)
+                                       : web::talk_to_foxglove(live)};
   };
-  site.tick = [&live] { live.tick(); };
+  site.tick = [&live, &recordings] {
+    live.tick();
+    recordings.tick();
+  };
   return site;
 }
 
@@ -108,8 +116,10 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
   access.loopback = is_loopback(settings.server.address);
   if (!access.loopback) access.token = new_token();
   access.origins = settings.origins;
+  std::unique_ptr<web::Recordings> recordings;
   const auto opened = web::Server::open(settings.server, [&](const web::Post& post) {
-    return make_site(**live, *files, access, post);
+    recordings = std::make_unique<web::Recordings>(settings.most_recording << 20U, post);
+    return make_site(**live, *recordings, *files, access, post);
   });
   if (!opened) {
     spdlog::error("{}", opened.error().message);
@@ -126,12 +136,14 @@ int serve(const Settings& settings, const sigset_t& stop_signals) {
   spdlog::info("stopping on signal {}", signal);
   (*live)->worker().stop();
   server.stop();
+  recordings->stop();
   return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == web::kReaderArgument) return web::read_recording();
   Settings settings;
   if (const auto status = web::read_arguments(argc, argv, settings)) return *status;
   const sigset_t stop_signals = cli::block_stop_signals();

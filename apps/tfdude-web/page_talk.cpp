@@ -6,6 +6,7 @@
 #include "tfdude/types/version.hpp"
 
 #include "../rendering/json.hpp"
+#include "page_recording.hpp"
 #include "request.hpp"
 
 namespace tfdude::web {
@@ -21,13 +22,17 @@ constexpr std::chrono::milliseconds kPairEvery{200};
 
 class PageTalk final : public Talk {
  public:
-  PageTalk(Live& live, Post post) : live_(live), post_(std::move(post)) { live_.count_viewer(1); }
+  PageTalk(Live& live, Recordings& recordings, Post post)
+      : live_(live), post_(std::move(post)), recording_(recordings) {
+    live_.count_viewer(1);
+  }
   ~PageTalk() override { live_.count_viewer(-1); }
   PageTalk(const PageTalk&) = delete;
   PageTalk& operator=(const PageTalk&) = delete;
 
   void begin(Link& link) override {
     link_ = &link;
+    recording_.begin(link);
     const nlohmann::json hello{{"op", "hello"}, {"version", version_line()}};
     send(std::make_shared<const std::string>(cli::dump(hello)));
     send(live_.status());
@@ -36,11 +41,25 @@ class PageTalk final : public Talk {
   }
 
   bool receive(std::string_view message, bool binary) override {
-    const auto request = binary ? std::nullopt : parse_request(message);
+    if (binary) return recording_.take(message);
+    const auto request = parse_request(message);
     if (!request) return false;
-    if (const auto* pair = std::get_if<PairRequest>(&*request)) {
-      wish_ = *pair;
-      take_wish();
+    if (const auto* upload = std::get_if<UploadRequest>(&*request)) return recording_.take(*upload);
+    if (std::holds_alternative<CancelRequest>(*request)) {
+      recording_.cancel();
+    } else if (std::holds_alternative<RobotRequest>(*request)) {
+      recording_.leave();
+    } else if (const auto* pair = std::get_if<PairRequest>(&*request)) {
+      ends_ = *pair;
+      if (recording_.is_shown()) {
+        recording_.follow(*pair);
+      } else {
+        wish_ = *pair;
+        take_wish();
+      }
+    } else if (recording_.is_shown()) {
+      // There is no newest value to go to, and nobody to explain.
+      if (const auto* past = std::get_if<PastRequest>(&*request)) recording_.show(past->at);
     } else if (const auto* past = std::get_if<PastRequest>(&*request)) {
       past_ = past->at;
       past_due_ = true;  // with the next picture, however many of these come until then
@@ -58,8 +77,12 @@ class PageTalk final : public Talk {
   }
 
   void tick() override {
+    const bool behind = link_->waiting() > kPageBehind;
+    recording_.tick(behind);
+    if (recording_.is_shown() != recorded_) change_over();
+    if (recorded_) return;
     take_wish();
-    if (link_->waiting() > kPageBehind) return;
+    if (behind) return;
     send_structure();
     send_events();
     send_status();
@@ -79,6 +102,23 @@ class PageTalk final : public Talk {
   }
 
  private:
+  // Between the robot and a recording. What owners were asked for is not wanted any more.
+  void change_over() {
+    recorded_ = recording_.is_shown();
+    pair_ = nullptr;
+    past_.reset();
+    past_due_ = false;
+    wish_.reset();
+    if (recorded_) return recording_.follow(ends_);
+    send(std::make_shared<const std::string>(cli::dump({{"op", "robot"}})));
+    send(live_.status());
+    status_ = live_.status_change().first;
+    structure_ = 0;  // it is sent again, with all values
+    events_ = 0;
+    joints_ = 0;
+    wish_ = ends_;
+  }
+
   void take_wish() {
     const auto now = std::chrono::steady_clock::now();
     if (!wish_ || now < next_pair_) return;
@@ -180,6 +220,9 @@ class PageTalk final : public Talk {
   std::uint64_t events_ = 0;
   std::uint64_t status_ = 0;
   std::uint64_t joints_ = 0;
+  PageRecording recording_;
+  bool recorded_ = false;  // the page was told of a recording last
+  PairRequest ends_;       // that the page has chosen
   std::optional<PairRequest> wish_;
   std::chrono::steady_clock::time_point next_pair_;  // when it may change
   std::shared_ptr<Pair> pair_;
@@ -193,8 +236,8 @@ class PageTalk final : public Talk {
 
 }  // namespace
 
-std::unique_ptr<Talk> talk_to_page(Live& live, Post post) {
-  return std::make_unique<PageTalk>(live, std::move(post));
+std::unique_ptr<Talk> talk_to_page(Live& live, Recordings& recordings, Post post) {
+  return std::make_unique<PageTalk>(live, recordings, std::move(post));
 }
 
 }  // namespace tfdude::web

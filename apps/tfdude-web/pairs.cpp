@@ -4,6 +4,7 @@
 
 #include "../rendering/explanation.hpp"
 #include "../rendering/json.hpp"
+#include "told.hpp"
 
 namespace tfdude::web {
 namespace {
@@ -112,27 +113,8 @@ Text Pairs::explained(const std::string& a, const std::string& b,
 Text Pairs::text_of(const std::string& a, const std::string& b,
                     const Result<StampedTransform>& X_AB, bool past,
                     const std::string& unreachable) const {
-  nlohmann::json json;
   const auto path = client_.path(a, b).value_or(std::vector<PathSegment>());
-  nlohmann::json segments = nlohmann::json::array();
-  for (const PathSegment& segment : path) {
-    segments.push_back(
-        {{"partition", segment.partition}, {"from", segment.from}, {"to", segment.to}});
-  }
-  if (X_AB) {
-    json = cli::lookup_json(a, b, *X_AB, path);
-    if (X_AB->stamp) json["stamp_ns"] = std::to_string(nanoseconds(*X_AB->stamp));
-  } else {
-    json = {{"from", a},
-            {"to", b},
-            {"error", X_AB.error().message},
-            {"code", to_string(X_AB.error().code)}};
-  }
-  json["op"] = "pair";
-  json["past"] = past;
-  if (!unreachable.empty()) json["unreachable"] = unreachable;
-  json["path"] = std::move(segments);
-  return std::make_shared<const std::string>(cli::dump(json));
+  return std::make_shared<const std::string>(pair_text(a, b, X_AB, path, past, unreachable));
 }
 
 }  // namespace tfdude::web

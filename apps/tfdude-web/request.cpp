@@ -35,6 +35,13 @@ std::optional<PageRequest> parse_request(std::string_view text) {
   const auto op = text_of(json, "op");
   if (op == "live") return LiveRequest{};
   if (op == "why") return WhyRequest{};
+  if (op == "cancel") return CancelRequest{};
+  if (op == "robot") return RobotRequest{};
+  if (op == "upload") {
+    const auto bytes = json.find("bytes");
+    if (bytes == json.end() || !bytes->is_number_unsigned()) return std::nullopt;
+    return UploadRequest{bytes->get<std::uint64_t>()};
+  }
   if (op == "pair") {
     const auto a = text_of(json, "a");
     const auto b = text_of(json, "b");

@@ -25,7 +25,17 @@ struct PastRequest {
 /// Show what is new.
 struct LiveRequest {};
 
-using PageRequest = std::variant<PairRequest, PastRequest, LiveRequest, WhyRequest>;
+/// A recording of so many bytes follows in pieces, to be shown to this page only.
+struct UploadRequest {
+  std::uint64_t bytes = 0;
+};
+/// The rest of that recording does not come.
+struct CancelRequest {};
+/// Show the robot instead of a recording.
+struct RobotRequest {};
+
+using PageRequest = std::variant<PairRequest, PastRequest, LiveRequest, WhyRequest, UploadRequest,
+                                 CancelRequest, RobotRequest>;
 
 /// Reads a message of a page. @return nothing if it is malformed
 [[nodiscard]] std::optional<PageRequest> parse_request(std::string_view text);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,9 +14,10 @@ namespace tfdude::web {
 struct Settings {
   Options options;
   ServerSettings server;
-  std::string urdf;                   ///< of the robot whose shapes are shown; empty: none
-  std::vector<std::string> packages;  ///< folders of its packages
-  std::vector<std::string> origins;   ///< of other pages that may connect
+  std::string urdf;                    ///< of the robot whose shapes are shown; empty: none
+  std::vector<std::string> packages;   ///< folders of its packages
+  std::vector<std::string> origins;    ///< of other pages that may connect
+  std::uint64_t most_recording = 256;  ///< size of a recording that a page sends [MiB]; 0: none
 };
 
 /// Reads the command line. @return the exit status, if the program ends here

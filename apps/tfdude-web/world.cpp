@@ -155,6 +155,11 @@ std::uint32_t World::structure() const {
   return structure_;
 }
 
+void World::number_structure(std::uint32_t structure) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  structure_ = structure;
+}
+
 std::optional<std::uint32_t> World::index_of(const std::string& id) const {
   const auto found = places_.find(id);
   return found == places_.end() ? std::nullopt : std::optional<std::uint32_t>(found->second);
@@ -179,26 +184,41 @@ nlohmann::json World::structure_json() const {
           {"frames", std::move(frames)}};
 }
 
-std::string World::values_since(std::uint64_t picture, Time now) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  Message message(Kind::kValues, structure_, now, false);
+Message World::values(std::uint64_t picture, Time now, bool past) const {
+  Message message(Kind::kValues, structure_, now, past);
   for (std::uint32_t i = 0; i < all_.size(); ++i) {
     const ShownFrame& frame = *all_[i];
     if (frame.has_value && frame.changed > picture) message.add_value(i, frame.pose, frame.stamp);
   }
-  return message.count() == 0 ? std::string() : message.finish();
+  return message;
 }
 
-std::string World::covariances_since(std::uint64_t picture, Time now) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  Message message(Kind::kCovariances, structure_, now, false);
+Message World::covariances(std::uint64_t picture, Time now, bool past) const {
+  Message message(Kind::kCovariances, structure_, now, past);
   for (std::uint32_t i = 0; i < all_.size(); ++i) {
     const ShownFrame& frame = *all_[i];
     if (frame.has_value && frame.covariance_changed > picture) {
       message.add_covariance(i, *frame.covariance, frame.correlated);
     }
   }
+  return message;
+}
+
+std::string World::values_since(std::uint64_t picture, Time now) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Message message = values(picture, now, false);
   return message.count() == 0 ? std::string() : message.finish();
+}
+
+std::string World::covariances_since(std::uint64_t picture, Time now) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Message message = covariances(picture, now, false);
+  return message.count() == 0 ? std::string() : message.finish();
+}
+
+std::vector<std::string> World::newest(Time now) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {values(0, now, true).finish(), covariances(0, now, true).finish()};
 }
 
 std::vector<std::string> World::at(Time instant) const {

@@ -65,6 +65,8 @@ class World {
 
   /// The number of the structure; it changes with frames, owners and their reachability.
   [[nodiscard]] std::uint32_t structure() const;
+  /// Numbers the structure as another world did that had the same, or anew.
+  void number_structure(std::uint32_t structure);
   /// What a page is sent of the structure.
   [[nodiscard]] nlohmann::json structure_json() const;
 
@@ -74,6 +76,8 @@ class World {
   [[nodiscard]] std::string covariances_since(std::uint64_t picture, Time now) const;
   /// Both messages for an instant. Frames without a value there are left out.
   [[nodiscard]] std::vector<std::string> at(Time instant) const;
+  /// Both messages of all newest values, as those of an instant that was asked for.
+  [[nodiscard]] std::vector<std::string> newest(Time now) const;
   /// The oldest instant that is kept, and the newest stamp.
   [[nodiscard]] std::optional<std::pair<Time, Time>> span() const;
 
@@ -94,6 +98,8 @@ class World {
   void take(Shown& partition, const ValuesNews& news);
   void keep(ShownFrame& frame, const WatchedValue& value);
   void rebuild();
+  [[nodiscard]] Message values(std::uint64_t picture, Time now, bool past) const;
+  [[nodiscard]] Message covariances(std::uint64_t picture, Time now, bool past) const;
   [[nodiscard]] std::optional<std::uint32_t> index_of(const std::string& id) const;
 
   mutable std::mutex mutex_;

@@ -11,6 +11,7 @@
 #include "tfdude-web/foxglove_request.hpp"
 #include "tfdude-web/request.hpp"
 #include "tfdude-web/site.hpp"
+#include "tfdude-web/upload.hpp"
 
 namespace tfdude::fuzz {
 namespace {
@@ -33,6 +34,26 @@ void read_foxglove(std::string_view bytes) {
     demand(!binary || std::holds_alternative<web::foxglove::NotOffered>(*request),
            "binary messages ask for nothing");
   }
+}
+
+// A file in pieces: each two bytes are a size, and how much was written since the last one.
+void read_upload(std::string_view bytes) {
+  if (bytes.empty()) return;
+  const auto start = web::Upload::Clock::now();
+  const std::uint64_t size = static_cast<unsigned char>(bytes[0]) * std::uint64_t{10'000};
+  if (!web::check_size(size, 2'000'000)) return;
+  web::Upload upload(size, start);
+  for (std::size_t i = 1; i + 1 < bytes.size() && !upload.complete(); i += 2) {
+    const auto piece = static_cast<std::size_t>(static_cast<unsigned char>(bytes[i])) * 258;
+    const bool whole = static_cast<unsigned char>(bytes[i]) == 255;
+    (void)upload.receive(whole ? web::Upload::kPiece : piece, start);
+    const std::uint64_t ahead = upload.received() - upload.written();
+    demand(upload.received() <= size, "no more comes than was said");
+    demand(ahead <= web::Upload::kAhead * web::Upload::kPiece, "the memory of pieces is bounded");
+    if (bytes[i + 1] % 2 != 0) upload.write(ahead);
+  }
+  demand(!upload.complete() || upload.received() == size, "all has come");
+  (void)web::check_beginning(bytes);
 }
 
 // The fields of a request, one a line.
@@ -71,5 +92,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   tfdude::fuzz::read_page(bytes);
   tfdude::fuzz::read_foxglove(bytes);
   tfdude::fuzz::read_head(bytes);
+  tfdude::fuzz::read_upload(bytes);
   return 0;
 }

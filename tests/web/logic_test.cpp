@@ -96,6 +96,11 @@ TEST_CASE("web: a token is taken from the address or from the cookie") {
 TEST_CASE("web: requests of pages are checked") {
   CHECK(std::holds_alternative<LiveRequest>(parse_request(R"({"op":"live"})").value()));
   CHECK(std::holds_alternative<WhyRequest>(parse_request(R"({"op":"why"})").value()));
+  CHECK(std::holds_alternative<RobotRequest>(parse_request(R"({"op":"robot"})").value()));
+  CHECK(std::holds_alternative<CancelRequest>(parse_request(R"({"op":"cancel"})").value()));
+  const auto upload = parse_request(R"({"op":"upload","bytes":18446744073709551615})");
+  REQUIRE(upload);
+  CHECK(std::get<UploadRequest>(*upload).bytes == UINT64_MAX);
   const auto pair = parse_request(R"({"op":"pair","a":"world","b":"hand"})");
   REQUIRE(pair);
   CHECK(std::get<PairRequest>(*pair).b == "hand");
@@ -105,7 +110,9 @@ TEST_CASE("web: requests of pages are checked") {
   for (const char* bad :
        {"", "null", R"({"op":"past","at":"-1"})", R"({"op":"past","at":"1e9"})",
         R"({"op":"past","at":"99999999999999999999"})", R"({"op":"pair","a":"world","b":""})",
-        R"({"op":"pair","a":"\u0007","b":"x"})", R"({"op":"update"})", R"({"op":5})"}) {
+        R"({"op":"pair","a":"\u0007","b":"x"})", R"({"op":"update"})", R"({"op":5})",
+        R"({"op":"upload"})", R"({"op":"upload","bytes":-1})", R"({"op":"upload","bytes":1.5})",
+        R"({"op":"upload","bytes":"5"})", R"({"op":"upload","bytes":18446744073709551616})"}) {
     INFO(bad);
     CHECK_FALSE(parse_request(bad));
   }

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import time
@@ -76,6 +77,18 @@ class Rig:
     def move(self, seconds=600):
         """Drives the arm at 1 kHz."""
         return self.start("arm_controller", "--seconds", seconds)
+
+    def record(self, file, seconds):
+        """Records so much, of the time of the robot."""
+        recorder = self.start("tfdude", "record", file)
+
+        def enough():
+            said = self.ask("info", file) if file.exists() else {}
+            return said.get("end_ns") is not None and said["end_ns"] - said["start_ns"] > seconds * 10**9
+
+        eventually(enough, "some seconds of a recording")
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait(timeout=WAIT)
 
     def ask(self, *arguments):
         """The answer of the command line."""

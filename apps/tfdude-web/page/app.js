@@ -4,6 +4,7 @@ import { Inspector } from './inspector.js';
 import { Labels } from './labels.js';
 import { drawEvents, drawJoints, drawOwners } from './lists.js';
 import { Model } from './model.js';
+import { Recording } from './recording.js';
 import { Scene } from './scene.js';
 import { element } from './text.js';
 import { Timeline } from './timeline.js';
@@ -22,10 +23,23 @@ const scene = new Scene(by('scene'), model);
 const labels = new Labels(by('labels'), scene);
 const tree = new Tree(model, { choose });
 const inspector = new Inspector(model, { ends: setEnds, why: () => connection.send({ op: 'why' }) });
-const timeline = new Timeline(model, { ask: (request) => connection.send(request) });
+const timeline = new Timeline(model, { ask: (request) => connection.send(request), robot: () => recording.leave() });
+const recording = new Recording({
+  send: (request) => connection.send(request),
+  piece: (buffer) => connection.sendRaw(buffer),
+  enter({ start, end }) {
+    changeOver(true);
+    timeline.enter(BigInt(start), BigInt(end));
+  },
+  leave() {
+    changeOver(false);
+    timeline.leave();
+  },
+});
 const costs = [];            // what the script took for each of the last pictures, without drawing [ms]
 let waiting = 0;             // the same, for messages since the last picture
 let fitted = false;
+let rootOfRobot = null;      // that all was seen from before a recording
 let sigmasDue = 0;
 let behindText = 0;
 
@@ -36,6 +50,9 @@ const connection = new Connection({
       structure: () => takeStructure(message),
       pair: () => takePair(message),
       why: () => inspector.takeWhy(message),
+      upload: () => recording.take(message),
+      recording: () => recording.takeAnswer(message),
+      robot: () => recording.left(),
       status: () => takeStatus(message),
       joints: () => {
         drawJoints(model.joints = message.joints);
@@ -56,6 +73,7 @@ const connection = new Connection({
     by('link').className = `link ${name === 'open' ? 'good' : 'bad'}`;
     by('link').textContent = name === 'open' ? 'live' : 'no server; trying again';
     if (name !== 'open') return;
+    recording.lost();
     model.events = [];
     timeline.again();
     askPair();
@@ -90,6 +108,20 @@ function takeStructure(message) {
   notice.hidden = model.count > 0;
   notice.replaceChildren(element('b', {}, 'No frames yet'),
     'No partition answers in this domain. Start one, for example with scripts/demo.');
+}
+
+/** Between the robot and a recording. The structure comes next. */
+function changeOver(recorded) {
+  if (recorded && !inspector.recorded) rootOfRobot = model.root;
+  if (rootOfRobot) wanted.set('root', rootOfRobot);
+  model.forget();
+  takeStructure({ version: -1, partitions: [], frames: [] });
+  drawEvents(model.events);
+  drawJoints(model.joints);
+  inspector.changeOver(recorded);
+  by('link').textContent = recorded ? 'recording' : 'live';
+  scene.turned = false;
+  fitted = false;
 }
 
 function takePair(message) {
@@ -166,6 +198,7 @@ function setTheme(light) {
 function picture(time) {
   requestAnimationFrame(picture);
   let begin = performance.now();
+  timeline.advance(begin);
   if (model.advance(begin)) later.update = true;
   if (later.update) {
     later.update = false;
@@ -312,4 +345,4 @@ drawEvents([]);
 if (wanted.get('b')) setEnds(wanted.get('a') || '', wanted.get('b'));
 requestAnimationFrame(picture);
 // For tests and for the curious.
-window.tfdude = { model, scene, inspector, timeline, tree, connection, costs, setEnds, seeFrom, setTheme, setShape };
+window.tfdude = { model, scene, inspector, timeline, tree, connection, costs, setEnds, seeFrom, setTheme, setShape, recording };

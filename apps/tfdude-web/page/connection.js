@@ -28,7 +28,9 @@ export class Connection {
     };
   }
 
-  send(request) {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
+  send(request) { this.sendRaw(JSON.stringify(request)); }
+
+  sendRaw(message) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(message);
   }
 }

@@ -19,6 +19,7 @@ export class Inspector {
     this.answer = null;
     this.why = null;          // the explanation of the pair
     this.k = 3;
+    this.recorded = false;    // a recording is shown
     this.box = document.getElementById('inspector');
     const end = (letter) => element('input', {
       type: 'text', id: `end-${letter}`, list: 'all-frames',
@@ -68,11 +69,21 @@ export class Inspector {
     if (answer.from !== this.a.value || answer.to !== this.b.value) return;
     this.answer = answer;
     this.dirty = true;
-    if (answer.error || answer.past) return;
+    if (answer.error || (answer.past && !this.recorded)) return;
     const { translation, rotation: q } = answer;
     if (!answer.stamp_ns) return;
     const t = Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6;
+    if (this.recorded) this.plot.forgetAfter(t);
     this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
+  }
+
+  /** Something else is shown: a recording, or the robot. */
+  changeOver(recorded) {
+    this.recorded = recorded;
+    this.plot.clear();
+    this.answer = null;
+    this.why = null;
+    this.draw();
   }
 
   takeWhy(why) {
@@ -112,7 +123,7 @@ export class Inspector {
       more.push(...this.path(answer));
     }
     this.body.replaceChildren(...parts);
-    this.reason.hidden = !this.b.value || !answer;
+    this.reason.hidden = !this.b.value || !answer || this.recorded;  // a recording has no owners to ask
     this.reasonBody.replaceChildren(...(this.why ? this.explanation(this.why) : []));
     this.more.replaceChildren(...more);
     if (!this.plotBox.hidden) {

@@ -55,6 +55,21 @@ export class Model {
     this.sigmaStale = true;
   }
 
+  /** Before something else is shown, of which nothing is known yet. */
+  forget() {
+    this.version = -1;
+    this.ids = [];
+    this.index = new Map();
+    this.partitions = [];
+    this.rates = {};
+    this.joints = [];
+    this.events = [];
+    this.span = null;
+    this.now = 0n;
+    this.chosen = null;
+    this.allocate(0);
+  }
+
   setStructure({ version, partitions, frames }) {
     this.arrive();
     const before = this.index;

@@ -10,6 +10,9 @@ export class Plot {
 
   clear() { this.samples = []; }
 
+  /** Of a recording that goes back. */
+  forgetAfter(t) { this.samples = this.samples.filter((sample) => sample.t < t); }
+
   add(t, value, sigma) {
     const last = this.samples[this.samples.length - 1];
     if (last && t <= last.t) return;

@@ -1,15 +1,18 @@
-// The slider through the past: all owners at one instant. While it is used, the server keeps sending nothing new.
+// The slider through the past: all owners at one instant. While it is used, the server keeps sending nothing new. Of a
+// recording, through all of it.
 import { clock, seconds } from './text.js';
 
 const KEPT = 60;       // [s]
 
 export class Timeline {
-  /** @param on  functions: ask(request) */
+  /** @param on  functions: ask(request), robot() */
   constructor(model, on) {
     this.model = model;
     this.on = on;
     this.at = null;      // BigInt ns; null: now
     this.asked = 0;
+    this.recorded = null;   // [start, end] of a recording that is shown, BigInt ns
+    this.played = 0;        // when it was moved on [ms]; 0: it does not play
     this.slider = document.getElementById('time');
     this.output = document.getElementById('instant');
     this.slider.addEventListener('input', () => this.drag());
@@ -19,6 +22,7 @@ export class Timeline {
 
   /** The instant of the slider's right end. */
   end() {
+    if (this.recorded) return this.recorded[1];
     if (this.at === null) this.held = this.model.commonInstant() ?? this.model.now;
     return this.held;
   }
@@ -29,12 +33,43 @@ export class Timeline {
   }
 
   togglePause() {
-    if (this.at === null) this.show(this.end()); else this.live();
+    if (this.recorded) this.play(!this.played);
+    else if (this.at === null) this.show(this.end()); else this.live();
   }
 
   step(s) {
     const end = this.end(), next = (this.at ?? end) + BigInt(Math.round(s * 1e9));
-    this.show(next > end ? end : next);
+    const first = this.recorded ? this.recorded[0] : next;
+    this.show(next > end ? end : next < first ? first : next);
+  }
+
+  /** Shows a recording, at its end. */
+  enter(start, end) {
+    this.recorded = [start, end];
+    this.slider.min = -Number(end - start) * 1e-9;
+    this.show(end);
+  }
+
+  /** Shows the robot as it is now. */
+  leave() {
+    this.recorded = null;
+    this.played = 0;
+    this.live();
+  }
+
+  play(on) {
+    this.played = on ? performance.now() : 0;
+    if (on && this.at >= this.recorded[1]) this.show(this.recorded[0]);
+    this.draw();
+  }
+
+  /** Plays on, at the speed at which it was recorded. */
+  advance(now) {
+    const ms = now - this.played;
+    if (!this.played || ms < 40) return;
+    this.played = now;
+    this.step(ms * 1e-3);
+    if (this.at === this.recorded[1]) this.play(false);
   }
 
   show(instant) {
@@ -59,6 +94,10 @@ export class Timeline {
   }
 
   live() {
+    if (this.recorded) {
+      this.on.robot();
+      return;
+    }
     clearTimeout(this.timer);
     this.at = null;
     this.model.past = false;
@@ -74,13 +113,17 @@ export class Timeline {
   }
 
   draw() {
-    const past = this.at !== null, { model } = this;
+    const past = this.at !== null, { model, recorded } = this;
     document.body.classList.toggle('past', past);
+    document.body.classList.toggle('playing', this.played > 0);
     document.getElementById('live').classList.toggle('on', !past);
     const kept = model.span ? Number(model.span[1] - model.span[0]) * 1e-9 : 0;
     if (!past) this.slider.min = -Math.max(1, Math.min(KEPT, Math.ceil(kept)));
     if (!past) {
       this.output.textContent = model.count ? `now · ${clock(model.now)}` : '';
+    } else if (recorded) {
+      const [from, length] = [this.at - recorded[0], recorded[1] - recorded[0]].map((ns) => seconds(Number(ns) * 1e-9));
+      this.output.textContent = `${from} of ${length} · ${clock(this.at)}`;
     } else {
       const back = Number(this.held - this.at) * 1e-9;
       const state = back < 0.0005 ? 'paused' : `${seconds(back)} earlier`;
