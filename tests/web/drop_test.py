@@ -37,8 +37,6 @@ class Dropped(unittest.TestCase):
                 severe = [line["message"] for line in browser.get_log("browser") if line["level"] == "SEVERE"]
                 self.assertEqual(severe, [])
             finally:
-                PICTURES.mkdir(parents=True, exist_ok=True)
-                browser.save_screenshot(str(PICTURES / "recording.png"))
                 browser.quit()
                 other.quit()
 
@@ -88,6 +86,8 @@ class Dropped(unittest.TestCase):
         self.eventually(browser, f"tfdude.model.now === {span[1]}n", "its end")
         self.eventually(browser, "!document.body.classList.contains('playing')", "a stop")
         self.eventually(browser, "tfdude.inspector.plot.samples.length > 5", "a plot")
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        browser.save_screenshot(str(PICTURES / "recording.png"))
         # Others go on seeing the robot.
         self.assertTrue(other.execute_script("return " + live + " && !tfdude.model.index.has('only_then')"))
         self.assertEqual(other.execute_script("return document.getElementById('banner').hidden"), True)
