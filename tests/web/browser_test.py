@@ -25,6 +25,14 @@ if not DRIVER or not shutil.which("chromium"):
 
 PICTURES = pathlib.Path(os.environ.get("TFDUDE_ARTEFACTS", rig.ROOT / "build/web-screenshots"))
 POSE = "const {model} = tfdude, i = 7 * model.index.get(arguments[0]); return [...model.pose.subarray(i, i + 7)]"
+# The interval and the numbers of the velocity that the page shows.
+VELOCITY = """
+const {inspector} = tfdude, {answer} = inspector, shown = answer && inspector.velocity(answer);
+if (!shown || !document.getElementById('inspector').innerText.includes('Velocity')) return null;
+const ago = (one) => BigInt(answer.stamp_ns) - BigInt(one.answer.stamp_ns);
+const before = [...inspector.plot.samples].reverse().find((one) => ago(one) >= 100000000n);
+return [before.answer.stamp_ns, answer.stamp_ns, shown.title];
+"""
 
 
 def open_browser(width=1440, height=900):
@@ -170,6 +178,16 @@ class Browser(unittest.TestCase):
         rig.eventually(lambda: browser.execute_script(wanted), "a button that says that something lies outside")
         robot.ask("remove", "beacon")
 
+    def velocity(self, robot, browser):
+        """That of the page is that of the owners, over the same interval."""
+        begin, end, title = rig.eventually(lambda: browser.execute_script(VELOCITY), "a velocity")
+        middle, over = (int(begin) + int(end)) // 2, (int(end) - int(begin)) * 1e-9
+        said = robot.ask("velocity", "world", "tool0", "--at", f"{middle // 10**9}.{middle % 10**9:09}",
+                         "--over", f"{over:.9f}")
+        shown = [float(one) for one in re.findall(r"-?\d+\.\d+", title)]
+        self.assert_close(shown, said["linear"] + said["angular"], 2e-3)
+        self.assertGreater(math.hypot(*shown[:3]), 0.01)
+
     def joints_move(self, browser):
         position = "return tfdude.model.joints[0].position"
         begin = time.monotonic()
@@ -197,6 +215,7 @@ class Browser(unittest.TestCase):
         self.assert_same_pose(browser.execute_script(POSE, "tool0"), self.number(said), 5e-3)
         browser.execute_script("tfdude.timeline.live()")
         self.answer(browser, " && !a.past")
+        self.velocity(robot, browser)
 
 
 if __name__ == "__main__":

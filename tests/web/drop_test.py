@@ -86,6 +86,8 @@ class Dropped(unittest.TestCase):
         self.eventually(browser, f"tfdude.model.now === {span[1]}n", "its end")
         self.eventually(browser, "!document.body.classList.contains('playing')", "a stop")
         self.eventually(browser, "tfdude.inspector.plot.samples.length > 5", "a plot")
+        text = "document.getElementById('inspector').innerText"
+        self.eventually(browser, f"/Velocity .*mean of/.test({text})", "a velocity")
         PICTURES.mkdir(parents=True, exist_ok=True)
         browser.save_screenshot(str(PICTURES / "recording.png"))
         # Others go on seeing the robot.

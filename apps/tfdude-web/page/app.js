@@ -97,6 +97,7 @@ function takeStructure(message) {
     element('optgroup', { label: 'roots' }, ...model.roots().map((i) => option(model.ids[i]))),
     element('optgroup', { label: 'frames' }, ...others.map(option)));
   roots.value = model.root;
+  nameRoot();
   scene.a = model.index.get(inspector.a.value) ?? -1;
   scene.b = model.index.get(inspector.b.value) ?? -1;
   inspector.setFrames();
@@ -164,9 +165,13 @@ function askPair() {
   connection.send(a && b ? { op: 'pair', a, b } : { op: 'pair', a: '', b: '' });
 }
 
+/** Its name may be longer than its box. */
+function nameRoot() { by('root').title = `${model.root || ''}\nAll poses and ellipsoids are relative to this frame`; }
+
 function seeFrom(id) {
   model.chooseRoot(id);
   by('root').value = id;
+  nameRoot();
   remember();
   const wasA = inspector.a.value;
   if (inspector.b.value && wasA !== id) setEnds(id, inspector.b.value);

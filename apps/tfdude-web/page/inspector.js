@@ -1,7 +1,7 @@
 // B in A: the numbers that the server has got from the owners, exactly as `tfdude lookup` prints them.
 import { UNSPECIFIED } from './model.js';
 import { Plot } from './plot.js';
-import { eigen, positionCovariance, toRpy } from './spatial.js';
+import { eigen, meanVelocity, positionCovariance, toRpy } from './spatial.js';
 import { clock, degrees, element, fixed, metres, seconds } from './text.js';
 
 const NAMES = ['x', 'y', 'z', 'roll', 'pitch', 'yaw'];
@@ -74,7 +74,7 @@ export class Inspector {
     if (!answer.stamp_ns) return;
     const t = Number(BigInt(answer.stamp_ns) / 1000n) * 1e-6;
     if (this.recorded) this.plot.forgetAfter(t);
-    this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer));
+    this.plot.add(t, [...translation, ...toRpy(q)], this.sigmas(answer), answer);
   }
 
   /** Something else is shown: a recording, or the robot. */
@@ -156,6 +156,8 @@ export class Inspector {
       if (joints.length) notes.push(note(`${joints.length} ${have} had no sample: ${joints.join(', ')}.`, 'warn'));
     }
     notes.push(note(this.distance(answer), ''));
+    const velocity = this.velocity(answer);
+    if (velocity) notes.push(velocity);
     if (s) notes.push(note('σ of x, y, z is along the axes of A, of the rotation about the axes of B.', ''));
     if (basis.bound) notes.push(note('σ is an upper bound: some correlations are not known.', ''));
     const copy = element('button', { class: 'copy', title: 'Copy as JSON',
@@ -173,6 +175,22 @@ export class Inspector {
     let variance = 0;
     for (let i = 0; i < 3; ++i) for (let j = 0; j < 3; ++j) variance += (t[i] * S[3 * i + j] * t[j]) / (d * d);
     return `Distance ${metres(d)} ± ${metres(Math.sqrt(Math.max(0, variance)))}.`;
+  }
+
+  /** Of B, the mean of the last tenth of a second or somewhat more; null: too little is known of the time before. */
+  velocity(answer) {
+    const { samples } = this.plot, after = samples[samples.length - 1];
+    if (!after || after.answer.stamp_ns !== answer.stamp_ns) return null;
+    const ago = ({ answer: { stamp_ns } }) => Number(BigInt(answer.stamp_ns) - BigInt(stamp_ns)) * 1e-9;
+    const before = [...samples].reverse().find((sample) => ago(sample) >= 0.1);
+    if (!before || ago(before) > 1) return null;
+    const { linear, angular } = meanVelocity(before.answer, answer, ago(before));
+    const along = (v) => v.map((c) => fixed(c, 3)).join('  ');
+    const made = note(`Velocity ${metres(Math.hypot(...linear))}/s, ${degrees(Math.hypot(...angular))}/s ` +
+      `(mean of ${seconds(ago(before))}).`, '');
+    made.title = `x, y, z along the axes of A: ${along(linear)} m/s, ${along(angular)} rad/s\n` +
+      'tfdude velocity says how certain it is.';
+    return made;
   }
 
   /** Why B in A is so uncertain, or why there is no answer: as `tfdude why` says it. */

@@ -2,7 +2,7 @@
 
 export class Plot {
   constructor() {
-    this.samples = [];    // {t [s], value[6], sigma[6] or null}
+    this.samples = [];    // {t [s], value[6], sigma[6] or null, answer}
     this.component = 0;
     this.span = 30;
     this.k = 3;
@@ -13,10 +13,10 @@ export class Plot {
   /** Of a recording that goes back. */
   forgetAfter(t) { this.samples = this.samples.filter((sample) => sample.t < t); }
 
-  add(t, value, sigma) {
+  add(t, value, sigma, answer) {
     const last = this.samples[this.samples.length - 1];
     if (last && t <= last.t) return;
-    this.samples.push({ t, value, sigma });
+    this.samples.push({ t, value, sigma, answer });
     while (this.samples.length && this.samples[0].t < t - this.span) this.samples.shift();
   }
 

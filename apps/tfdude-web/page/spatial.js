@@ -130,6 +130,21 @@ export function factor(A, S) {
   A[0] = a; A[1] = 0; A[2] = 0; A[3] = b; A[4] = d; A[5] = 0; A[6] = c; A[7] = e; A[8] = f;
 }
 
+/**
+ * The mean velocity between two poses {rotation, translation} of B in A, so many seconds apart: of B's origin [m/s], and
+ * of its rotation [rad/s], both along the axes of A.
+ */
+export function meanVelocity(before, after, dt) {
+  const linear = after.translation.map((x, i) => (x - before.translation[i]) / dt);
+  const [px, py, pz, pw] = before.rotation, [qx, qy, qz, qw] = after.rotation;
+  // The vector of after · before⁻¹, the shorter way round.
+  const w = qw * pw + qx * px + qy * py + qz * pz, sign = w < 0 ? -1 : 1;
+  const turn = [qx * pw - qw * px - qy * pz + qz * py, qy * pw - qw * py - qz * px + qx * pz,
+    qz * pw - qw * pz - qx * py + qy * px];
+  const sine = Math.hypot(...turn), angle = 2 * Math.atan2(sine, Math.abs(w));
+  return { linear, angular: turn.map((c) => (sine === 0 ? 0 : (sign * c * angle) / (sine * dt))) };
+}
+
 /** Roll, pitch, yaw about fixed axes [rad], as the command line prints them. */
 export function toRpy([x, y, z, w]) {
   const sine = Math.max(-1, Math.min(1, 2 * (w * y - z * x)));
