@@ -27,6 +27,7 @@ using Clock = std::chrono::steady_clock;
 // Descriptors of the process.
 constexpr int kSocket = STDIN_FILENO;
 constexpr int kFile = STDERR_FILENO + 1;
+constexpr int kNice = 5;
 
 // A question is its length and JSON. An answer is messages, each its length and its bytes, and one
 // of the ends; after that of an error, its text likewise.
@@ -97,7 +98,7 @@ std::optional<std::string> receive_text(int socket, std::uint32_t most,
 // Before anything of the file is read. The robot comes first: for time, and for memory.
 void limit_process(std::uint64_t memory) {
   (void)prctl(PR_SET_PDEATHSIG, SIGKILL);
-  (void)setpriority(PRIO_PROCESS, 0, 10);
+  (void)setpriority(PRIO_PROCESS, 0, kNice);
   const int adjustment = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
   if (adjustment >= 0) {
     (void)!write(adjustment, "1000", 4);

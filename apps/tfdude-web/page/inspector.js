@@ -80,6 +80,7 @@ export class Inspector {
   /** Something else is shown: a recording, or the robot. */
   changeOver(recorded) {
     this.recorded = recorded;
+    this.plot.end = recorded ? '0 s' : 'now';
     this.plot.clear();
     this.answer = null;
     this.why = null;

@@ -6,6 +6,7 @@ export class Plot {
     this.component = 0;
     this.span = 30;
     this.k = 3;
+    this.end = 'now';     // what the newest instant is called
   }
 
   clear() { this.samples = []; }
@@ -66,7 +67,7 @@ export class Plot {
     for (const s of [-30, -20, -10, 0]) {
       const at = Math.round(x(end + s)) + 0.5;
       g.beginPath(); g.moveTo(at, bottom); g.lineTo(at, bottom + 4); g.stroke();
-      g.fillText(s ? `${s} s` : 'now', Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
+      g.fillText(s ? `${s} s` : this.end, Math.min(right - 10, Math.max(left + 12, x(end + s))), height - 4);
     }
     g.save();
     g.beginPath();
