@@ -54,8 +54,9 @@ bool wait_for(int socket, short events, const std::optional<Clock::time_point>& 
   }
 }
 
-bool receive(int socket, char* bytes, std::size_t count,
+bool receive(int socket, void* place, std::size_t count,
              const std::optional<Clock::time_point>& deadline) {
+  auto* bytes = static_cast<char*>(place);
   while (count > 0) {
     if (!wait_for(socket, POLLIN, deadline)) return false;
     const ssize_t got = recv(socket, bytes, count, MSG_DONTWAIT);
@@ -80,14 +81,16 @@ bool send_all(int socket, std::string_view bytes,
 }
 
 void put(std::string& bytes, std::uint32_t number) {
-  bytes.append(reinterpret_cast<const char*>(&number), sizeof(number));
+  char raw[sizeof(number)];
+  std::memcpy(raw, &number, sizeof(number));
+  bytes.append(raw, sizeof(number));
 }
 
 // A text after its length.
 std::optional<std::string> receive_text(int socket, std::uint32_t most,
                                         const std::optional<Clock::time_point>& deadline) {
   std::uint32_t size = 0;
-  if (!receive(socket, reinterpret_cast<char*>(&size), sizeof(size), deadline) || size > most) {
+  if (!receive(socket, &size, sizeof(size), deadline) || size > most) {
     return std::nullopt;
   }
   std::string text(size, '\0');
@@ -101,7 +104,7 @@ void limit_process(std::uint64_t memory) {
   (void)setpriority(PRIO_PROCESS, 0, kNice);
   const int adjustment = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
   if (adjustment >= 0) {
-    (void)!write(adjustment, "1000", 4);
+    (void)(write(adjustment, "1000", 4) < 0);
     close(adjustment);
   }
   const rlimit no_core{0, 0};
@@ -139,7 +142,7 @@ Result<std::vector<Told>> answer_to(const std::string& question, RecordedView& v
 std::optional<std::uint32_t> receive_message(int socket, Clock::time_point deadline,
                                              std::size_t& left, std::vector<Told>& told) {
   std::uint32_t head = 0;
-  if (!receive(socket, reinterpret_cast<char*>(&head), sizeof(head), deadline)) return std::nullopt;
+  if (!receive(socket, &head, sizeof(head), deadline)) return std::nullopt;
   if (head == kEnd || head == kError) return head;
   const std::size_t size = head & ~kBinary;
   if (size > left) return std::nullopt;

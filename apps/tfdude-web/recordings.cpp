@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "../environment.hpp"
 #include "upload.hpp"
 
 namespace tfdude::web {
@@ -21,8 +22,8 @@ std::string reason() { return std::generic_category().message(errno); }
 
 // Not /tmp, which may be memory.
 std::string folder() {
-  const char* chosen = std::getenv("TMPDIR");
-  return chosen != nullptr && *chosen != '\0' ? chosen : "/var/tmp";
+  const std::string chosen = cli::environment("TMPDIR");
+  return chosen.empty() ? "/var/tmp" : chosen;
 }
 
 }  // namespace
