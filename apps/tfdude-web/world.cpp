@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 
 #include "tfdude/math/interpolate.hpp"
 
@@ -94,16 +95,23 @@ void World::keep(ShownFrame& frame, const WatchedValue& value) {
     frame.past.erase(std::partition_point(frame.past.begin(), frame.past.end(), kept),
                      frame.past.end());
   }
+  if (value.cleared) {
+    frame.past.clear();
+    frame.has_value = false;
+    return;
+  }
   const StatedCovariance sigma = whole(value).covariance;
   auto shared = frame.covariance && *frame.covariance == sigma
                     ? frame.covariance
                     : std::make_shared<const StatedCovariance>(sigma);
   if (value.stamp) {
-    const auto place = std::upper_bound(
+    auto place = std::lower_bound(
         frame.past.begin(), frame.past.end(), *value.stamp,
-        [](Time time, const ShownFrame::Sample& sample) { return time < sample.stamp; });
-    const bool newest = place == frame.past.end();
-    frame.past.insert(place, {*value.stamp, value.X_PC.pose, shared});
+        [](const ShownFrame::Sample& sample, Time time) { return sample.stamp < time; });
+    const bool is_corrected = place != frame.past.end() && place->stamp == *value.stamp;
+    if (!is_corrected) place = frame.past.emplace(place);
+    *place = {*value.stamp, value.X_PC.pose, shared};
+    const bool newest = std::next(place) == frame.past.end();
     while (frame.past.size() > most_past_ ||
            frame.past.back().stamp - frame.past.front().stamp > kKept) {
       frame.past.pop_front();

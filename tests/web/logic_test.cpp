@@ -167,6 +167,24 @@ TEST_CASE("web: an instant of the past is interpolated, and has no value outside
   CHECK(count_in(world.at(ms(50)).at(0)) == 0);
 }
 
+TEST_CASE("web: a sample that was corrected is shown as it is now") {
+  World world;
+  fill(world);
+  world.receive({"arm", ValuesNews{1, {value(1, 1, ms(100)), value(1, 3, ms(200))}}});
+  world.receive({"arm", ValuesNews{2, {value(1, 2, ms(100))}}});
+  CHECK(read_at<float>(world.at(ms(100)).at(0), 28) == 2.0F);
+  CHECK(read_at<float>(world.at(ms(150)).at(0), 28) == 2.5F);
+  CHECK(read_at<float>(world.values_since(0, ms(300)), 28) == 3.0F);
+  world.receive({"arm", ValuesNews{3, {value(1, 4, ms(200))}}});
+  CHECK(read_at<float>(world.values_since(0, ms(300)), 28) == 4.0F);
+  // Its history is cleared: it has no value until the next sample.
+  WatchedValue cleared = value(1, 4);
+  cleared.cleared = true;
+  world.receive({"arm", ValuesNews{4, {cleared}}});
+  CHECK(count_in(world.at(ms(100)).at(0)) == 0);
+  CHECK(world.values_since(0, ms(300)).empty());
+}
+
 TEST_CASE("web: a frame keeps its value while its partition changes around it") {
   World world;
   fill(world);
