@@ -13,8 +13,9 @@ struct Drift {
 };
 
 /// Of an edge that drifts: it has moved from one value to the other as it was told (F is the
-/// adjoint of that motion's inverse), and w is what the drift has added, or an upper bound where
-/// the two values differ by less than what is added without a lever.
+/// adjoint of that motion's inverse), and w is what the drift has added (random_walk.hpp), the
+/// difference of the two covariances. Where a pose that came late leaves it a little below zero, an
+/// upper bound.
 /// @return nothing if the later value does not follow from the earlier one, as an observation has
 ///   corrected it alone
 [[nodiscard]] std::optional<Drift> drift_between(const Belief& earlier, const Belief& later);

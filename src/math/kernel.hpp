@@ -67,6 +67,12 @@ struct Fourth {
   alignas(32) double N[2][3][4] = {};
 };
 
+/// A pose, and by how much what is transported by it counts.
+struct Weighted {
+  Columns X;
+  double weight;
+};
+
 /// The functions compiled for one instruction set.
 struct Functions {
   /// X_SH := X_SC · X_PC⁻¹ for each edge in turn, C the frame reached so far.
@@ -82,6 +88,8 @@ struct Functions {
                                const Edges& from_b, double* X_AB);
   /// Ad(X) Σ Ad(X)ᵀ, both as upper triangles, row by row.
   void (*transport)(const Columns& X, const double* upper, double* transported);
+  /// Σ w Ad(X) Σ Ad(X)ᵀ over `count` poses.
+  void (*transport_sum)(const Weighted* all, std::size_t count, const double* upper, double* sum);
   /// sum += Ad(X) F, both with six rows and `count` columns, column by column.
   void (*add_columns)(const Columns& X, const double* F, std::size_t count, double* sum);
   /// As interpolate(), for the pairs that are near.

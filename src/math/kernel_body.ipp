@@ -309,6 +309,17 @@ void transport(const Columns& X, const double* upper, double* transported) {
   store_upper(sum, transported);
 }
 
+void transport_sum(const Weighted* all, std::size_t count, const double* upper, double* total) {
+  Blocks sum;
+  set_zero(sum);
+  for (std::size_t k = 0; k < count; ++k) {
+    double weighted[21];
+    for (int i = 0; i < 21; ++i) weighted[i] = all[k].weight * upper[i];
+    add_transported(load(all[k].X), weighted, sum);
+  }
+  store_upper(sum, total);
+}
+
 void add_columns(const Columns& columns, const double* F, std::size_t count, double* sum) {
   const Motion X = load(columns);
   for (std::size_t k = 0; k < count; ++k, F += 6, sum += 6) {

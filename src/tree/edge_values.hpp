@@ -141,9 +141,11 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
     const Correlation* said = nullptr;
     if (!from.find_said(copy, said)) return not_readable();
     if (revised || said != nullptr || samples.drifts()) {
+      const Walk walk{samples.process_noise(), beyond};
+      const bool drifts = samples.drifts();
       const CorrelatedValue ahead =
-          extrapolate_correlated(before, newest, edge.X_PC, s, said, samples.drifts());
-      return accumulate_correlated(path, ahead, samples, noise);
+          extrapolate_correlated(before, newest, edge.X_PC, s, said, drifts ? &walk : nullptr);
+      return accumulate_correlated(path, ahead, samples, drifts ? seconds(moment.age) : noise);
     }
   }
   OfEdge<Value>& X = path.place();
@@ -193,9 +195,9 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
     if (samples.drifts()) {
       const Correlation* said = nullptr;
       if (!from.find_said(copy, said)) return not_readable();
-      const double since = s * span * 1e-9;
-      const auto X = drifted_between(before, after, s, said, samples.process_noise(), since);
-      if (X) return accumulate_correlated(path, *X, samples, seconds(moment.age));
+      const Walk walk{samples.process_noise(), span * 1e-9};
+      const CorrelatedValue X = drifted_between(before, after, s, said, walk);
+      return accumulate_correlated(path, X, samples, seconds(moment.age));
     }
   }
   if constexpr (std::is_same_v<Value, Belief>) {

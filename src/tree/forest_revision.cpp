@@ -119,8 +119,8 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
     const Sample& before = *samples.sample(number - 1);
     const std::int64_t at = later.stamp;
     const CorrelatedValue value =
-        drifted(before, nullptr, given(later).pose, samples.timing().process_noise,
-                static_cast<double>(at - before.stamp) * 1e-9);
+        drifted(before, nullptr, given(later).pose,
+                {samples.timing().process_noise, static_cast<double>(at - before.stamp) * 1e-9});
     const SampleRevision moved{
         {given(later).pose, {}}, value.correlation, {false, is_between(later), 0, stamp}};
     replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
@@ -228,8 +228,14 @@ void Forest::Impl::push_of_drift(const HeldVersion& newest, const GivenValue& va
   const Correlation* said = newest.correlation != nullptr ? &newest.correlation->said() : nullptr;
   const double seconds = std::abs(static_cast<double>(stamp - other.stamp)) * 1e-9;
   const Pose& G_PC = value.X_PC.pose;
-  CorrelatedValue next =
-      drifted(other, said, G_PC, newest.samples->timing().process_noise, seconds);
+  const EdgeTiming& timing = newest.samples->timing();
+  CorrelatedValue next = drifted(other, said, G_PC, {timing.process_noise, seconds});
+  // Nothing has been observed, so the pose is as it was given.
+  const bool in_order = follows && place == newest.samples->next();
+  const bool plain = newest.correlation == nullptr && other.revision() == nullptr;
+  if (in_order && plain && newest.samples->has_noise()) {
+    return push_checked(newest, {next.X_PC}, stamp);
+  }
   // Partners that have got another value since are not linked any more.
   if (newest.correlation != nullptr && newest.correlation->revised()) {
     next.correlation.observed_with = newest.correlation->now().observed_with;

@@ -8,6 +8,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "math/common_errors.hpp"
+#include "math/random_walk.hpp"
 #include "math/semidefinite.hpp"
 
 namespace tfdude {
@@ -24,6 +25,36 @@ Belief belief_of(const Sample& sample, const Correlation* said) {
   belief.common_errors = correlation->common_errors;
   if (correlation->unknown) belief.unknown = std::exchange(belief.own, {});
   return belief;
+}
+
+// Whether an observation has corrected the second sample, but not the first.
+bool is_corrected_alone(const Sample& before, const Sample& after, const Correlation* said) {
+  const Correlation* second = correlation_at(after, said);
+  if (second == nullptr) return false;
+  const Correlation* first = correlation_at(before, said);
+  const auto is_new = [&](const CommonError& error) {
+    if (first == nullptr) return true;
+    const auto& all = first->common_errors;
+    return std::none_of(all.begin(), all.end(),
+                        [&](const CommonError& one) { return one.source == error.source; });
+  };
+  return std::any_of(second->common_errors.begin(), second->common_errors.end(), is_new);
+}
+
+// The covariance of what was interpolated between two samples, and of what a random walk has added
+// beside. The share of the later one is not the best gain, so part of this is correlated with its
+// error, and an observation has changed how.
+Covariance with_walk(const Covariance& interpolated, const Twist& xi, double s,
+                     const Matrix6d& share, const Walk& walk) {
+  const Pose to = exp(Twist(s * xi));
+  const Pose from = exp(Twist((1.0 - s) * xi));
+  const Matrix6d F = adjoint(from.inverse());
+  const Matrix6d until = walked(walk.density, to, s * walk.seconds).matrix();
+  const Matrix6d since = walked(walk.density, from, (1.0 - s) * walk.seconds).matrix();
+  const Bridge bridge = bridged(until, F, since);
+  const Matrix6d beyond = bridge.K - share;
+  const Matrix6d correlated = beyond * (F * until * F.transpose() + since) * beyond.transpose();
+  return bound(interpolated, Covariance::trusted(correlated)) + Covariance::trusted(bridge.rest);
 }
 
 // The covariance of X is that of the whole error, of which the common errors are a part.
@@ -67,40 +98,22 @@ Transform whole(const Sample& sample, const Correlation* said) {
 }
 
 CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pose& G_PC,
-                        const Covariance& density, double seconds) {
-  const Pose increment = given(before).pose.inverse() * G_PC;
-  const Pose back = increment.inverse();
+                        const Walk& walk) {
+  const SharedRevision* revision = before.revision();
   const Transform X = before.value();
-  CorrelatedValue found{{X.pose * increment, X.covariance.of_specified().transported(back)}, {}};
-  Covariance::Upper added = density.upper();
-  for (double& one : added) one *= seconds;
-  found.X_PC.covariance += Covariance::trusted(added);
+  const Pose increment = (revision != nullptr ? revision->given.pose : X.pose).inverse() * G_PC;
+  const Pose back = increment.inverse();
+  CorrelatedValue found{{G_PC, X.covariance.of_specified().transported(back)}, {}};
+  if (revision != nullptr) found.X_PC.pose = X.pose * increment;
+  found.X_PC.covariance += walked(walk.density, increment, walk.seconds);
   found.X_PC.covariance.set_complete(X.covariance.complete());
   if (const Correlation* correlation = correlation_at(before, said)) {
     found.correlation = *correlation;
-    found.correlation.common_errors = times(adjoint(back), correlation->common_errors);
-  }
-  return found;
-}
-
-std::optional<CorrelatedValue> drifted_between(const Sample& before, const Sample& after, double s,
-                                               const Correlation* said, const Covariance& density,
-                                               double seconds) {
-  const auto has_source = [](const Correlation* correlation, const std::string& source) {
-    if (correlation == nullptr) return false;
-    const auto& all = correlation->common_errors;
-    return std::any_of(all.begin(), all.end(),
-                       [&](const CommonError& one) { return one.source == source; });
-  };
-  const Correlation* first = correlation_at(before, said);
-  if (const Correlation* second = correlation_at(after, said)) {
-    for (const CommonError& one : second->common_errors) {
-      if (!has_source(first, one.source)) return std::nullopt;
+    if (!correlation->common_errors.empty()) {
+      found.correlation.common_errors = times(adjoint(back), correlation->common_errors);
     }
   }
-  Pose G_PC;
-  interpolate(given(before).pose, given(after).pose, s, G_PC);
-  return drifted(before, said, G_PC, density, seconds);
+  return found;
 }
 
 Transform given(const Sample& sample) {
@@ -114,23 +127,37 @@ Matrix6d share_of_after(const Sample& before, const Sample& after, double s) {
 }
 
 CorrelatedValue interpolate_observed(const Sample& before, const Sample& after, double s,
-                                     const Correlation* said) {
+                                     const Correlation* said, const Walk* walk) {
   const Belief X0 = belief_of(before, said);
   const Belief X1 = belief_of(after, said);
   Transform X;
   interpolate(collapse(X0), collapse(X1), s, X);
   const Twist xi = log(X0.pose.inverse() * X1.pose);
   const Matrix6d B0 = right_jacobian((s - 1.0) * xi) * right_jacobian(-xi).inverse();
+  const Matrix6d share = share_of_after(before, after, s);
+  if (walk != nullptr && X.covariance.complete()) {
+    X.covariance = with_walk(X.covariance.of_specified(), xi, s, share, *walk);
+  }
   std::vector<CommonError> common_errors = times((1.0 - s) * B0, X0.common_errors);
-  add_errors(times(share_of_after(before, after, s), X1.common_errors), common_errors);
+  add_errors(times(share, X1.common_errors), common_errors);
   return split(X, std::move(common_errors), X0.unknown || X1.unknown);
+}
+
+CorrelatedValue drifted_between(const Sample& before, const Sample& after, double s,
+                                const Correlation* said, const Walk& walk) {
+  if (!is_corrected_alone(before, after, said)) {
+    Pose G_PC;
+    interpolate(given(before).pose, given(after).pose, s, G_PC);
+    return drifted(before, said, G_PC, {walk.density, s * walk.seconds});
+  }
+  return interpolate_observed(before, after, s, said, &walk);
 }
 
 CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
                                        const Transform& X_newest, double s, const Correlation* said,
-                                       bool drifts) {
+                                       const Walk* walk) {
   const double beyond = s - 1.0;
-  if (!drifts && before.revision() == nullptr && after.revision() == nullptr) {
+  if (walk == nullptr && before.revision() == nullptr && after.revision() == nullptr) {
     CorrelatedValue found;
     extrapolate(before, after, X_newest, s, found.X_PC);
     if (said == nullptr) return found;
@@ -148,7 +175,10 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
   const Covariance offset = collapse(X1).covariance.of_specified().transported(ahead.inverse());
   X.covariance = offset;
   bool complete = !X1.unspecified;
-  if (!drifts) {
+  if (walk != nullptr) {
+    // The sample before has also moved by it, by which the twist is wrong.
+    if (complete) X.covariance += walked(walk->density, ahead, s * walk->seconds);
+  } else {
     const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
     X.covariance =
         bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));

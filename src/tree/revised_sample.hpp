@@ -21,22 +21,25 @@ struct CorrelatedValue {
 /// Of a sample. @param said  of its edge; null: nothing
 [[nodiscard]] Transform whole(const Sample& sample, const Correlation* said);
 
+/// The random walk of the error of an edge that drifts, over some time.
+struct Walk {
+  const Covariance& density;  ///< per second
+  double seconds;             ///< not negative
+};
+
 /// A sample of an edge that drifts, some time after another one: its error is that of the other,
-/// and what the drift has added.
+/// and what the drift has added (random_walk.hpp).
 /// @param G_PC  the pose as it was given
-/// @param seconds  from the other to this one; not negative
+/// @param walk  from the other to this one
 [[nodiscard]] CorrelatedValue drifted(const Sample& before, const Correlation* said,
-                                      const Pose& G_PC, const Covariance& density, double seconds);
+                                      const Pose& G_PC, const Walk& walk);
 
 /// The value of an edge that drifts, between two samples: that of the first one, and what the drift
-/// has added since. Nothing if an observation has corrected the second sample, but not the first:
-/// then interpolate_observed() has a bound.
-/// @param seconds  from the first to the instant
-[[nodiscard]] std::optional<CorrelatedValue> drifted_between(const Sample& before,
-                                                             const Sample& after, double s,
-                                                             const Correlation* said,
-                                                             const Covariance& density,
-                                                             double seconds);
+/// has added since. If an observation has corrected the second sample, but not the first, a bound:
+/// that of interpolate_observed().
+/// @param walk  from the first sample to the second
+[[nodiscard]] CorrelatedValue drifted_between(const Sample& before, const Sample& after, double s,
+                                              const Correlation* said, const Walk& walk);
 
 /// Of a sample, as it was before all observations.
 [[nodiscard]] Transform given(const Sample& sample);
@@ -58,8 +61,10 @@ struct CorrelatedValue {
 
 /// As interpolate() of two samples, at least one of which was observed. Common errors count by the
 /// share that each sample has in the value (interpolate.hpp), all else is own.
+/// @param walk  of an edge that drifts, from `before` to `after`: by what it may deviate is added
 [[nodiscard]] CorrelatedValue interpolate_observed(const Sample& before, const Sample& after,
-                                                   double s, const Correlation* said);
+                                                   double s, const Correlation* said,
+                                                   const Walk* walk = nullptr);
 
 /// By what the error of `after` counts there: the value's error is that much of it, and much of
 /// that of `before`.
@@ -69,9 +74,10 @@ struct CorrelatedValue {
 /// samples as given: the correction is an offset, and stays. Common errors that are said of the
 /// edge may differ from sample to sample, as own parts may, and grow as those do.
 /// @param X1  the value of `after`
-/// @param drifts  the samples tell exactly how the edge has moved, apart from its process noise
+/// @param walk  of an edge that drifts, from `after` on: it is added. Its samples tell exactly how
+///   it has moved, apart from that. Null for other edges.
 [[nodiscard]] CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
                                                      const Transform& X1, double s,
-                                                     const Correlation* said, bool drifts);
+                                                     const Correlation* said, const Walk* walk);
 
 }  // namespace tfdude

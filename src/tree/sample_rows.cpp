@@ -10,6 +10,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "math/common_errors.hpp"
+#include "math/random_walk.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
 #include "tree/revised_sample.hpp"
@@ -89,16 +90,15 @@ Way way_between(const HeldVersion& edge, std::int64_t from, std::int64_t to) {
     if (sample == nullptr || sample->stamp <= from) break;
     if (sample->stamp < to) on_way.push_back(sample);
   }
-  const Matrix6d density = edge.samples->timing().process_noise.matrix();
+  const Covariance& density = edge.samples->timing().process_noise;
   Way way;
   Pose here = given_at(edge, from);
   std::int64_t now = from;
   const auto go = [&](const Pose& next, std::int64_t then) {
     const Pose step = here.inverse() * next;
     const Matrix6d back = adjoint(step.inverse());
-    way.added =
-        (back * way.added * back.transpose() + static_cast<double>(then - now) * 1e-9 * density)
-            .eval();
+    const Covariance more = walked(density, step, static_cast<double>(then - now) * 1e-9);
+    way.added = (back * way.added * back.transpose() + more.matrix()).eval();
     way.increment = way.increment * step;
     here = next;
     now = then;
@@ -148,12 +148,11 @@ Tied after_row(const RowOfSample& row, const Way& way) {
 Tied between_rows(const RowOfSample& first, const Way& to, const Way& from,
                   const RowOfSample& second) {
   const Matrix6d F = from.carry();
-  const Matrix6d with_second = to.added * F.transpose();
-  const Matrix6d K = with_second * pseudo_inverse(F * with_second + from.added);
+  const Bridge bridge = bridged(to.added, F, from.added);
+  const Matrix6d& K = bridge.K;
   const Pose forward = first.X_PC.pose * to.increment;
   const Twist missed = log((forward * from.increment).inverse() * second.X_PC.pose);
-  Tied tied{forward * exp(Twist(K * missed)),
-            nearest_semidefinite(to.added - K * with_second.transpose()), false,
+  Tied tied{forward * exp(Twist(K * missed)), bridge.rest, false,
             times((Matrix6d::Identity() - K * F) * to.carry(), first.correlation.common_errors)};
   add_errors(times(K, second.correlation.common_errors), tied.common_errors);
   return tied;

@@ -21,6 +21,7 @@
 #include "support/catch.hpp"
 #include "support/networks.hpp"
 #include "support/random.hpp"
+#include "support/random_walk.hpp"
 #include "support/sanitizers.hpp"
 
 namespace tfdude {
@@ -53,7 +54,7 @@ class DenseFilter {
   }
   // A value whose error is that of another one, moved, and what has been added.
   void drift(const std::string& from, const std::string& to, const Pose& increment,
-             const Covariance& added) {
+             const Matrix6d& added) {
     set(to, Covariance());
     const Eigen::Index before = rows_.at(from);
     const Eigen::Index row = rows_.at(to);
@@ -61,7 +62,7 @@ class DenseFilter {
     P_.middleRows(row, 6) = (back * P_.middleRows(before, 6)).eval();
     P_.middleCols(row, 6) = (P_.middleCols(before, 6) * back.transpose()).eval();
     P_.block(row, row, 6, 6) =
-        (back * P_.block(before, before, 6, 6) * back.transpose() + added.matrix()).eval();
+        (back * P_.block(before, before, 6, 6) * back.transpose() + added).eval();
   }
   void observe(const std::map<std::string, Matrix6d>& path, const Covariance& R) {
     const Matrix PH = with(path);
@@ -242,7 +243,7 @@ class Robot {
       filter_.set(row("base", newest_), sigma);
     } else {
       filter_.drift(row("base", newest_ - 1), row("base", newest_), increment,
-                    Covariance::trusted(Matrix6d(0.1 * Q_.matrix())));
+                    testing::walked_in_steps(Q_.matrix(), log(increment), 0.1));
     }
     filter_.set(row("head", newest_), X_BH.covariance.of_specified());
     const Transform X_BT = joint_transform(slider_.joint, position, variance);
