@@ -1,93 +1,25 @@
-#include "math/drift.hpp"
-
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <vector>
-
-#include "tfdude/math/observation.hpp"
 
 #include "support/catch.hpp"
 #include "support/consistency.hpp"
-#include "support/forest_support.hpp"
+#include "support/drifting.hpp"
 #include "support/random.hpp"
 #include "support/random_walk.hpp"
 #include "support/sampling.hpp"
-#include "tree/forest.hpp"
 
 // An edge whose error is a random walk, beside a dense filter of odometry and a landmark.
 namespace tfdude {
 namespace {
 
 using testing::Approx;
+using testing::at;
+using testing::Drifting;
+using testing::kStep;
+using testing::of_deviations;
 using testing::outcome;
 using testing::Random;
-
-constexpr double kStep = 0.1;  // [s]
-
-Time at(int step) { return Time(std::chrono::milliseconds(100 * step)); }
-
-Query when(Time stamp) {
-  Query query;
-  query.at = stamp;
-  return query;
-}
-Query when(int step) { return when(at(step)); }
-
-Pose shift(double x) { return Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}); }
-
-Covariance of_deviations(double translation, double rotation) {
-  return *Covariance::from_stddev(
-      {translation, translation, translation, rotation, rotation, rotation});
-}
-
-// world -> base drifts, world -> object stands.
-struct Drifting {
-  explicit Drifting(const Covariance& density = of_deviations(0.02, 0.01)) : Q(density) {
-    REQUIRE(forest.add("world", "", {}));
-    REQUIRE(forest.add("base", "world", {}));
-    REQUIRE(forest.add("object", "world", {Pose(), of_deviations(1, 1)}));
-    EdgeTiming timing;
-    timing.drifts = true;
-    timing.process_noise = Q;
-    REQUIRE(forest.set_timing("base", timing));
-  }
-  void drive(int step) { REQUIRE(forest.update("base", {G, Covariance()}, at(step))); }
-
-  // As an observer does.
-  Result<void> see(const Transform& Z, int step, const std::string& source) {
-    return see(Z, at(step), source);
-  }
-  Result<void> see(const Transform& Z, Time stamp, const std::string& source) {
-    const auto seen =
-        forest.lookup_segments({{"world", "base"}, {"world", "object"}}, when(stamp), {}, true);
-    if (!seen) return tl::unexpected(seen.error());
-    std::vector<ObservedEdge> edges;
-    for (std::size_t i = 0; i < 2; ++i) {
-      edges.push_back({belief_of(seen->values[i], seen->correlations[i]),
-                       i == 0 ? ObservedEdge::Way::kUp : ObservedEdge::Way::kDown});
-    }
-    const auto found = observe(edges, Z, source, {1.0, true});
-    if (!found) return tl::unexpected(found.error());
-    std::vector<Revision> revisions;
-    for (std::size_t i = 0; i < 2; ++i) {
-      const Belief& X = found->edges[i].X_PC;
-      revisions.push_back(
-          {i == 0 ? "base" : "object", {X.pose, X.own}, {false, X.common_errors, {}}});
-    }
-    return forest.revise(revisions, stamp, seen->commit);
-  }
-
-  [[nodiscard]] double sigma(const std::string& a, const std::string& b, int step) const {
-    const auto X = forest.lookup(a, b, when(step));
-    REQUIRE(X);
-    return std::sqrt(X->covariance.of_specified().upper()[0]);
-  }
-
-  const Covariance Q;
-  Pose G;
-  Forest forest;
-};
+using testing::shift;
+using testing::when;
 
 // A chain of odometry, one axis: the joint covariance of base and object, in closed form.
 struct Filter {
@@ -380,68 +312,6 @@ TEST_CASE("drift: a pose from before the first one is less certain than that") {
   const double first = robot.sigma("world", "base", 2);
   robot.drive(1);
   CHECK(robot.sigma("world", "base", 1) == Approx(std::hypot(first, 0.02 * std::sqrt(kStep))));
-}
-
-// Beside the joint covariance of the errors at two instants, which knows nothing of samples.
-TEST_CASE("drift: the errors at any two instants are those of one walk, whatever turns it makes") {
-  Random random(4302);
-  INFO("seed " << random.seed());
-  for (const double turn : {0.0, 0.03, 0.3, 1.0, 3.1}) {
-    for (int run = 0; run < 5; ++run) {
-      INFO("turns of " << turn << " rad, run " << run);
-      std::array<double, 6> noise{};
-      for (double& one : noise) one = random.index(2) == 0 ? 0.0 : random.uniform(0.001, 0.1);
-      Drifting robot(*Covariance::from_stddev(noise));
-      const Matrix6d Q = robot.Q.matrix();
-      std::vector<Twist> steps;
-      robot.drive(0);
-      for (int step = 1; step <= 5; ++step) {
-        steps.push_back(Twist());
-        steps.back() << random.vector(0.3), turn * random.direction();
-        robot.G = robot.G * exp(steps.back());
-        robot.drive(step);
-      }
-      const auto belief_at = [&](double t) {
-        const Time stamp = at(0) + std::chrono::nanoseconds(std::llround(t * 1e8));
-        const auto seen = robot.forest.lookup_segments({{"world", "base"}}, when(stamp), {}, true);
-        REQUIRE(seen);
-        return belief_of(seen->values[0], seen->correlations[0]);
-      };
-      const auto round = [](double t) { return std::round(t * 1e4) / 1e4; };
-      const double from = round(random.uniform(0, 4));
-      const double to = run == 0 ? 5 : round(random.uniform(from, 5));
-      // From the start until then, in parts up to each sample.
-      Matrix6d sigma = Matrix6d::Zero();
-      Matrix6d added = Matrix6d::Zero();
-      Matrix6d first = Matrix6d::Zero();
-      double t = 0;
-      for (const double next : {std::min(from, 1.0), std::min(from, 2.0), std::min(from, 3.0), from,
-                                std::clamp(1.0, from, to), std::clamp(2.0, from, to),
-                                std::clamp(3.0, from, to), std::clamp(4.0, from, to), to}) {
-        if (next <= t) continue;
-        const Twist xi = (next - t) * steps[static_cast<std::size_t>(t)];
-        const Matrix6d A = testing::adjoint_of_exp(Twist(-xi));
-        const Matrix6d more = testing::walked_in_steps(Q, xi, (next - t) * kStep);
-        sigma = (A * sigma * A.transpose() + more).eval();
-        if (next <= from) first = sigma;
-        if (next > from) added = (A * added * A.transpose() + more).eval();
-        t = next;
-      }
-      const Belief earlier = belief_at(from);
-      const Belief later = belief_at(to);
-      const Matrix6d unit = 1e-14 * Matrix6d::Identity();
-      const auto is_same = [&](const Covariance& found, const Matrix6d& expected) {
-        const Twist scale = (expected + unit).diagonal().cwiseSqrt().cwiseInverse();
-        const Matrix6d off = scale.asDiagonal() * (found.matrix() - expected) * scale.asDiagonal();
-        return off.cwiseAbs().maxCoeff() < 1e-5;
-      };
-      CHECK(is_same(earlier.own, first));
-      CHECK(is_same(later.own, sigma));
-      const auto drift = drift_between(earlier, later);
-      REQUIRE(drift);
-      CHECK(is_same(drift->added, added));
-    }
-  }
 }
 
 }  // namespace tfdude
