@@ -71,7 +71,8 @@ struct EdgeTiming {
   Covariance process_noise{};
   /// True: the edge's error is a random walk of that density, as is that of odometry. Its values
   /// tell how it moves from one to the next; their covariance does not count, except for the first.
-  /// So the error of each value is that of the one before, and what has been added since, Q Δt.
+  /// So the error of each value is that of the one before, and what has been added since: Q Δt, and
+  /// what the way makes of it, along which the edge moves evenly.
   /// What observations find out about it is kept, and so is its correlation with what was observed.
   /// A lookup gets the corrected pose: that of the value before, moved as the given values tell.
   bool drifts = false;
