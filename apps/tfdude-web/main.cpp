@@ -147,6 +147,8 @@ int main(int argc, char** argv) {
   Settings settings;
   if (const auto status = web::read_arguments(argc, argv, settings)) return *status;
   const sigset_t stop_signals = cli::block_stop_signals();
+  // A file that a page sends may reach the limit of this process; the write tells it.
+  std::signal(SIGXFSZ, SIG_IGN);
   cli::log_to_standard_error();
   const int status = serve(settings, stop_signals);
   spdlog::shutdown();

@@ -20,7 +20,6 @@ void PageRecording::tell(const std::string& error) {
 
 bool PageRecording::take(const UploadRequest& request) {
   if (coming_ != nullptr) return false;
-  ignored_ = 0;
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) {
     tell("wait a second before another file");
@@ -32,6 +31,7 @@ bool PageRecording::take(const UploadRequest& request) {
     tell(begun.error().message);
     return true;
   }
+  ignored_ = 0;
   coming_ = *begun;
   upload_.emplace(request.bytes, now);
   written({}, 0);

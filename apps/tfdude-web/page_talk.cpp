@@ -49,6 +49,7 @@ class PageTalk final : public Talk {
       recording_.cancel();
     } else if (std::holds_alternative<RobotRequest>(*request)) {
       recording_.leave();
+      asked_for_robot_ = true;
     } else if (const auto* pair = std::get_if<PairRequest>(&*request)) {
       ends_ = *pair;
       if (recording_.is_shown()) {
@@ -79,7 +80,8 @@ class PageTalk final : public Talk {
   void tick() override {
     const bool behind = link_->waiting() > kPageBehind;
     recording_.tick(behind);
-    if (recording_.is_shown() != recorded_) change_over();
+    const bool asked = std::exchange(asked_for_robot_, false);
+    if (recording_.is_shown() != recorded_ || asked) change_over();
     if (recorded_) return;
     take_wish();
     if (behind) return;
@@ -221,6 +223,7 @@ class PageTalk final : public Talk {
   std::uint64_t status_ = 0;
   std::uint64_t joints_ = 0;
   PageRecording recording_;
+  bool asked_for_robot_ = false;
   bool recorded_ = false;  // the page was told of a recording last
   PairRequest ends_;       // that the page has chosen
   std::optional<PairRequest> wish_;

@@ -35,7 +35,7 @@ constexpr std::uint32_t kBinary = 1U << 31U;
 constexpr std::uint32_t kEnd = 0xffffffff;
 constexpr std::uint32_t kError = 0xfffffffe;
 constexpr std::uint32_t kMostQuestion = 4096;                    // [B]
-constexpr std::uint32_t kMostAnswer = std::uint32_t{64} << 20U;  // [B]
+constexpr std::uint32_t kMostAnswer = std::uint32_t{16} << 20U;  // [B]
 
 // Without a deadline, waits for ever. @return false: the other side has closed, or is too late
 bool wait_for(int socket, short events, const std::optional<Clock::time_point>& deadline) {
@@ -180,6 +180,10 @@ Result<std::unique_ptr<ReaderProcess>> ReaderProcess::start(int file) {
   // Not one of the numbers that are made below.
   const int theirs = fcntl(ends[1], F_DUPFD_CLOEXEC, kFile + 1);
   close(ends[1]);
+  if (theirs < 0) {
+    close(ends[0]);
+    return fail(Errc::kTooMuch, "the server has no descriptor for the reader of the file");
+  }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, file, kFile);
@@ -192,7 +196,7 @@ Result<std::unique_ptr<ReaderProcess>> ReaderProcess::start(int file) {
   pid_t pid = 0;
   const int failed = posix_spawn(&pid, "/proc/self/exe", &actions, nullptr, argv, environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (theirs >= 0) close(theirs);
+  close(theirs);
   if (failed != 0) {
     close(ends[0]);
     return fail(Errc::kTooMuch, "the server cannot start a reader of the file");

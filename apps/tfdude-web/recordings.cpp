@@ -120,7 +120,12 @@ Result<SentRecording*> Recordings::begin(std::uint64_t bytes) {
   }
   const auto file = make_file(bytes);
   if (!file) return tl::unexpected(file.error());
-  all_.push_back(std::unique_ptr<SentRecording>(new SentRecording(*file, bytes, post_)));
+  try {
+    all_.push_back(std::unique_ptr<SentRecording>(new SentRecording(*file, bytes, post_)));
+  } catch (const std::system_error&) {
+    close(*file);
+    return fail(Errc::kTooMuch, "the server has no thread for the file");
+  }
   return all_.back().get();
 }
 
@@ -137,7 +142,10 @@ Result<int> Recordings::make_file(std::uint64_t bytes) const {
   std::string name = folder() + "/tfdude-web-XXXXXX";
   const int file = mkostemp(name.data(), O_CLOEXEC);  // for its user only
   if (file < 0) return fail(Errc::kTooMuch, "the server has no place for files: " + reason());
-  (void)unlink(name.c_str());
+  if (unlink(name.c_str()) != 0) {
+    close(file);
+    return fail(Errc::kTooMuch, "the server cannot hide the file: " + reason());
+  }
   struct statvfs disk {};
   // What the others will have counts as taken, also as far as it is written.
   std::uint64_t needed = bytes + kLeftFree;

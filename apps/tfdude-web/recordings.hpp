@@ -19,8 +19,8 @@
 namespace tfdude::web {
 
 /// One of them: a file without a name, so that it is gone with the server however that ends, and a
-/// process that reads it. The functions are called on the server's thread and do not wait; results
-/// are passed there, unless leave() was called before.
+/// process that reads it. The functions are called on the server's thread, and wait for the disk
+/// only to make the empty file; results are passed there, unless leave() was called before.
 class SentRecording {
  public:
   template <class T>

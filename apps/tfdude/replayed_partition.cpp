@@ -60,7 +60,7 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
       if (!of_sample) spec.correlation = replayed(known[i]->correlation);
       edge.correlation = spec.correlation;
       // Until its sample is applied, a dynamic edge has no value that would hold for all times.
-      const bool moves = of_sample || known[i]->unsampled;
+      const bool moves = known[i]->stamp || known[i]->unsampled;
       const Covariance noise = known[i]->begins.value_or(Covariance());
       if (moves || noise.upper() != Covariance::Upper{}) {
         spec.timing = options.history;
@@ -145,12 +145,20 @@ Result<void> ReplayedPartition::flush() {
   for (const EdgeUpdate& edge : batch) {
     auto one = node_.update(edge.id, edge.X_PC, stamp_);
     // An observation has corrected the sample.
-    if (!one && one.error().code == Errc::kStampTaken) {
-      one = node_.rewrite(edge.id, {*stamp_, *stamp_}, {{*stamp_, edge.X_PC}});
-    }
+    if (!one && one.error().code == Errc::kStampTaken) one = correct(edge);
     if (!one) ++rejected_;
   }
   return {};
+}
+
+Result<void> ReplayedPartition::correct(const EdgeUpdate& edge) {
+  Query query;
+  query.at = stamp_;
+  const auto there = node_.lookup(served_[edge.id].parent, edge.id, query);
+  const bool is_known = there && there->pose.matrix() == edge.X_PC.pose.matrix() &&
+                        there->covariance == edge.X_PC.covariance;
+  if (is_known) return {};
+  return node_.rewrite(edge.id, {*stamp_, *stamp_}, {{*stamp_, edge.X_PC}});
 }
 
 // The value begins a history, so nothing before it holds any more.

@@ -54,6 +54,8 @@ class ReplayedPartition {
   void rewrite(const std::string& id, const ValuesNews& values, std::size_t first, Edge& edge);
   void clear(const std::string& id, const WatchedValue& value, Edge& edge);
   [[nodiscard]] Result<void> flush();
+  /// Replaces the sample at the stamp, unless it is the same.
+  [[nodiscard]] Result<void> correct(const EdgeUpdate& edge);
 
   Node node_;
   std::vector<WatchedFrame> frames_;  // as they were applied last

@@ -110,6 +110,11 @@ class WatchedGroup {
   CovarianceNumbers numbers_;
 };
 
+/// Whether these values are a snapshot(), and not what a push has told since the one before.
+[[nodiscard]] inline bool is_answer(const PushedValues& values) {
+  return values.after == 0 || values.after == values.commit;
+}
+
 /// Splits the values into pieces that fit into a message.
 [[nodiscard]] std::vector<PushedValues> pieces_of(PushedValues&& pushed);
 

@@ -37,12 +37,13 @@ void ToldSamples::add(Time stamp, std::uint64_t commit, const Transform& X,
   auto told = place_of(stamp);
   if (told == told_.end() || told->stamp != stamp) told = told_.emplace(told);
   *told = {stamp, commit, hash_of(X, correlation)};
+  if (told_.size() >= 2 * kMost) told_.erase(told_.begin(), told_.end() - kMost);
 }
 
 bool ToldSamples::is_news(const PushedValue& sample, std::uint64_t commit, bool in_answer) {
   const auto told = place_of(*sample.stamp);
   if (told == told_.begin() && told != told_.end() && told->stamp > *sample.stamp) {
-    return !in_answer;
+    return !in_answer || commit >= corrected_;
   }
   if (told == told_.end() || told->stamp != *sample.stamp) return true;
   if (commit <= told->commit) return false;

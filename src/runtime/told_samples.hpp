@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,11 +17,15 @@ class ToldSamples {
   [[nodiscard]] bool empty() const { return told_.empty(); }
   void clear() { told_.clear(); }
 
+  /// A sample that is not newer than all others was told as of this commit, whether it is kept here
+  /// or not.
+  void corrected(std::uint64_t commit) { corrected_ = std::max(corrected_, commit); }
+
   /// Adds what was told of a stamp as of a commit of the owner, or replaces it.
   void add(Time stamp, std::uint64_t commit, const Transform& X, const Correlation& correlation);
 
-  /// Whether a sample before the newest one is news as of this commit. One of which an earlier
-  /// commit tells is none, nor what an answer has from before all that is known here.
+  /// Whether a sample before the newest one is news as of this commit. What a later commit has told
+  /// of it, or may have told, is left as it is.
   [[nodiscard]] bool is_news(const PushedValue& sample, std::uint64_t commit, bool in_answer);
 
   /// Forgets what an answer that tells all samples from an instant on does not contain.
@@ -35,7 +40,11 @@ class ToldSamples {
   };
   [[nodiscard]] std::vector<Told>::iterator place_of(Time stamp);
 
-  std::vector<Told> told_;  // by stamp
+  // An answer has no more.
+  static constexpr std::size_t kMost = kMaxItems;
+
+  std::vector<Told> told_;       // by stamp
+  std::uint64_t corrected_ = 0;  // the latest commit of corrected()
 };
 
 }  // namespace tfdude

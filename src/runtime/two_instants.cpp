@@ -57,8 +57,7 @@ class TwoPathsTask final : public Task {
     for (std::size_t i = 0; i < path.edges.size(); ++i) {
       const std::string& id = plans_[side].edges[i].info.id;
       edges.push_back({id, path.edges[i].X_PC, path.edges[i].way == ObservedEdge::Way::kUp,
-                       is_moving(id, path.correlations[i]),
-                       is_drifting(id, path.correlations[i])});
+                       is_moving(id, path.correlations[i]), is_drifting(id, path.correlations[i])});
     }
     return edges;
   }

@@ -111,6 +111,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
     edges_[i].commit = edge.commit;
     edges_[i].answered = edge.answered;
     edges_[i].answered_from = edge.answered_from;
+    edges_[i].said = edge.said;
     edges_[i].newest = edge.newest;
     edges_[i].complete = edge.complete;
   }
@@ -148,6 +149,12 @@ void WatchMirror::admit(const Source& source, PushedValue entry, const Message& 
       message.commit <= edge.commit ||
       (message.commit <= edge.answered && (!entry.stamp || *entry.stamp >= edge.answered_from));
   const bool is_stale = !begins && is_told;
+  // Only the last value in a message has what is said of the edge.
+  if (!is_of_sample(entry)) {
+    const bool is_old = !begins && message.commit <= std::max(edge.commit, edge.answered);
+    if (is_old) entry.correlation = edge.said;
+    edge.said = entry.correlation;
+  }
   if (is_stale && (!entry.stamp || entry.cleared)) return;
   if (!begins) entry.process_noise.reset();
   if (!begins || entry.continues != edge.history) entry.kept_before.reset();
@@ -177,10 +184,9 @@ void WatchMirror::note_skipped(const Source& source, const PushedValues& answer)
 
 void WatchMirror::note_told(const PushedValues& message, bool follows_on,
                             const std::vector<PushedValue>& values) {
-  const bool is_answer = message.after == 0;
   for (const PushedValue& value : values) {
     Edge& edge = edges_[value.index];
-    if (!is_answer) {
+    if (!is_answer(message)) {
       // If something is missing, the same commit may be told again, with more.
       const std::uint64_t more = follows_on || message.commit == 0 ? 0 : 1;
       edge.commit = std::max(edge.commit, message.commit - more);

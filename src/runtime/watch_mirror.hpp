@@ -108,6 +108,7 @@ class WatchMirror {
     std::uint64_t commit = 0;    // as of which pushes have told it
     std::uint64_t answered = 0;  // as of which an answer has, from that stamp on:
     Time answered_from;
+    Correlation said;              // as of the later of both
     std::optional<Time> newest;    // of its samples
     std::optional<Time> complete;  // up to which none is missing
     std::size_t source = 0;

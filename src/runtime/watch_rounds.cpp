@@ -166,14 +166,11 @@ void WatchRounds::answered(Clock::time_point now) {
   asked_.reset();
   Watched& watched = current();
   bool all = true;
-  bool whole = true;
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const auto* pushed = std::get_if<PushedValues>(&replies[i].body);
     // An owner that has restarted since the plan has other groups.
     if (pushed != nullptr && pushed->group == groups_[i].id) {
       (void)watched.take(*pushed, now);
-      // An answer leaves edges out if a push that tells of them is on its way.
-      whole = whole && pushed->after == 0;
       continue;
     }
     all = false;
@@ -182,7 +179,7 @@ void WatchRounds::answered(Clock::time_point now) {
     }
   }
   if (!all) return finish_turn(false);
-  if (from_ && whole) watched.on_told_from(*from_);
+  if (from_) watched.on_told_from(*from_);
   // Only the first answers show that one edge is ahead of the data of another.
   if (!std::exchange(asked_again_, true)) {
     if (const auto from = watched.lacks_earlier()) return ask(from, now);

@@ -235,8 +235,10 @@ void WatchedPartition::note_skipped(const Group& group, const PushedValues& answ
     seen[entry.index] = true;  // its first sample
     if (group.frames[entry.index] == kGone) continue;
     const Known& known = known_[group.frames[entry.index]];
-    if (!known.newest || entry.history != known.history || *entry.stamp <= *known.newest) continue;
-    skipped_from_ = std::min(skipped_from_.value_or(*known.newest), *known.newest);
+    const bool has_samples = known.newest && entry.history == known.history;
+    if (known.history == 0 || (has_samples && *entry.stamp <= *known.newest)) continue;
+    const Time from = has_samples ? *known.newest : *entry.stamp - kStreamed;
+    skipped_from_ = std::min(skipped_from_.value_or(from), from);
   }
   if (skipped_from_) misses(*skipped_from_);
 }
@@ -268,7 +270,11 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
     known.correlation = entry.correlation;
   }
   if (begins || entry.cleared) known.told.clear();
-  if (entry.stamp && (missing_from_ || !answered_ || is_pushed_twice())) {
+  if (!begins && entry.stamp && known.newest && *entry.stamp <= *known.newest) {
+    known.told.corrected(message.commit);
+  }
+  const bool settling = !answered_ && period_.count() == 0;
+  if (entry.stamp && (missing_from_ || settling || is_pushed_twice())) {
     known.told.add(*entry.stamp, message.commit, entry.X, entry.correlation);
   }
   if (!late) {
@@ -305,9 +311,13 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
     return true;
   }
   const auto [is_old, follows_on] = group->received.place(*whole);
-  const Message message{whole->after == 0, follows_on, whole->commit};
-  if (!message.follows_on) misses_recent();
-  if (message.reply && !is_old && period_.count() == 0) note_skipped(*group, *whole);
+  const Message message{is_answer(*whole), follows_on, whole->commit};
+  if (!message.follows_on) {
+    misses_recent();
+    // Of edges that had no samples, all may be missing.
+    if (!missing_from_ && group->received.answered()) misses(Time());
+  }
+  if (whole->after == 0 && !is_old && period_.count() == 0) note_skipped(*group, *whole);
   if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
   ValuesNews news{whole->commit, {}};
   news.values.reserve(whole->entries.size());

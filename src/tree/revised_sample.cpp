@@ -176,8 +176,9 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
   X.covariance = offset;
   bool complete = !X1.unspecified;
   if (walk != nullptr) {
-    // The sample before has also moved by it, by which the twist is wrong.
-    if (complete) X.covariance += walked(walk->density, ahead, s * walk->seconds);
+    // If the edge truly goes on evenly, the twist is wrong by what the last interval has added, so
+    // that this counts s times: its variance s², of which the newest sample has 1.
+    if (complete) X.covariance += walked(walk->density, ahead, (1.0 + s) * walk->seconds);
   } else {
     const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
     X.covariance =

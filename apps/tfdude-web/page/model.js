@@ -96,9 +96,24 @@ export class Model {
       this.newest.set(kept.edge.subarray(7 * old, 7 * old + 7), 7 * i);
       this.sigma.set(kept.sigma.subarray(36 * old, 36 * old + 36), 36 * i);
     });
+    this.cutCycles();
     for (const list of this.children) list.sort((a, b) => (this.ids[a] < this.ids[b] ? -1 : 1));
     if (!this.index.has(this.root)) this.root = this.defaultRoot();
     this.reroot();
+  }
+
+  /** Only a damaged recording has any. */
+  cutCycles() {
+    const walk = new Int32Array(this.count);  // the one that has come by
+    for (let start = 0; start < this.count; ++start) {
+      for (let i = start; i >= 0 && walk[i] === 0; i = this.parent[i]) {
+        walk[i] = start + 1;
+        const above = this.parent[i];
+        if (above < 0 || walk[above] !== start + 1) continue;
+        this.parent[i] = -1;
+        this.children[above].splice(this.children[above].indexOf(i), 1);
+      }
+    }
   }
 
   roots() {

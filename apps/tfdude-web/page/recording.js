@@ -48,7 +48,7 @@ export class Recording {
   /** The server has written so much. */
   async take({ written }) {
     const { coming } = this;
-    if (!coming) return;
+    if (!coming || written > coming.sent) return;  // of a file that was given up
     coming.written = written;
     this.draw();
     if (coming.reading) return;
@@ -76,7 +76,8 @@ export class Recording {
       this.coming = null;
       return this.fail(message.error);
     }
-    if (this.coming) this.shown = this.coming.file.name;
+    if (!this.coming) return this.leave();  // it was given up meanwhile
+    this.shown = this.coming.file.name;
     this.coming = null;
     this.about = message;
     this.error = '';

@@ -147,6 +147,42 @@ TEST_CASE("watch mirror: an answer tells nothing of earlier samples than it has"
   }
 }
 
+TEST_CASE("watch mirror: what is said of an edge is that of the latest commit") {
+  const auto said = [](const char* source) {
+    return Correlation{false, {{source, false, Loading::Ones(6, 1) * 1e-3}}, {}};
+  };
+  Watched watched;
+  WatchMirror& mirror = watched.mirror;
+  PushedValue first = sample(0, 10, 1, 4, true);
+  first.correlation = said("k");
+  CHECK(mirror.take({kTools, {first}, 0, 9}));
+  const auto sources = [&] { return mirror.lookup(at(40))->basis.sources; };
+  PushedValue newest = sample(0, 40, 4, 4);
+  SECTION("an answer overtakes a push") {
+    newest.correlation = said("k");
+    CHECK(mirror.take({kTools, {newest}, 0, 11}));
+    (void)mirror.take({kTools, {sample(0, 30, 3, 4), newest}, 9, 11});
+    CHECK(sources() == std::vector<std::string>{"k"});
+  }
+  SECTION("a push tells what was said before") {
+    newest.correlation = said("later");
+    CHECK(mirror.take({kTools, {newest}, 0, 12}));
+    PushedValue before = sample(0, 30, 3, 4);
+    before.correlation = said("k");
+    (void)mirror.take({kTools, {before}, 9, 11});
+    CHECK(sources() == std::vector<std::string>{"later"});
+  }
+}
+
+TEST_CASE("watch mirror: an answer that leaves edges out is no push") {
+  Watched watched;
+  WatchMirror& mirror = watched.mirror;
+  CHECK(mirror.take({kTools, {sample(0, 10, 1, 4, true), sample(0, 20, 2, 4)}, 0, 9}));
+  (void)mirror.take({kTools, {sample(0, 20, 2, 4)}, 12, 12});
+  (void)mirror.take({kTools, {sample(0, 10, 5, 4)}, 9, 11});
+  CHECK(mirror.lookup(at(10))->pose.translation().x() == 16);
+}
+
 TEST_CASE("watch mirror: after a lost push no half of a commit is visible") {
   Watched watched;
   // A commit of both edges was lost, and one of the edges was written again.

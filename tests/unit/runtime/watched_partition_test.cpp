@@ -47,6 +47,10 @@ struct WatchedOwner {
     return stamps;
   }
 
+  bool has(std::uint32_t frame, long stamp) {
+    const std::lock_guard lock(mutex);
+    return values_at.count({frame, stamp}) > 0;
+  }
   // What was told last.
   double told_at(std::uint32_t frame, long stamp) {
     const std::lock_guard lock(mutex);
@@ -165,6 +169,91 @@ TEST_CASE("watched partition: what an answer shows to be lost is asked for") {
   CHECK_FALSE(owner.watch.lacks(owner.now));
   CHECK(eventually([&] { return owner.told().size() >= 4; }));
   CHECK(owner.told() == std::vector<long>{1000, 1005, 1020, 1010});
+}
+
+// An owner of two edges; the first pushes of the watch were taken.
+struct SettledOwner : WatchedOwner {
+  SettledOwner() {
+    REQUIRE(forest.add("lamp", "base", along_x(1)));
+    group.emplace(plan());
+    answer(*group);
+    push();
+    (void)watch.groups(now);
+    now += WatchedPartition::kSettle + 100ms;
+    write("arm", 5ms);
+    push();
+    REQUIRE_FALSE(watch.lacks(now));
+  }
+  void write(const char* id, Milliseconds at) {
+    REQUIRE(forest.update(id, along_x(1), Time(1s) + at));
+  }
+  void push() { (void)watch.take(group->next_push(forest), now); }
+  void lose() { (void)group->next_push(forest); }
+  // What a round does if something is missing.
+  void ask() {
+    REQUIRE(watch.lacks(now));
+    const std::optional<Time> from = watch.lacks_from();
+    answer(*group);
+    if (from) watch.on_told_from(*from);
+  }
+  std::optional<WatchedGroup> group;
+};
+
+constexpr std::uint32_t kArm = 0;
+constexpr std::uint32_t kLamp = 2;
+
+TEST_CASE("watched partition: first samples of an edge that were lost are asked for") {
+  SettledOwner owner;
+  owner.write("lamp", 10ms);
+  owner.lose();
+  const bool is_noticed = GENERATE(false, true);
+  owner.write("lamp", 20ms);
+  owner.write("arm", 20ms);
+  if (is_noticed) {
+    owner.push();
+  } else {
+    owner.lose();
+    owner.answer(*owner.group);
+  }
+  owner.ask();
+  CHECK(eventually([&] { return owner.has(kLamp, 1010) && owner.has(kLamp, 1020); }));
+  CHECK_FALSE(owner.watch.lacks(owner.now));
+}
+
+TEST_CASE("watched partition: a correction that was lost comes with the answer") {
+  SettledOwner owner;
+  owner.write("lamp", 5ms);
+  for (const auto at : {10ms, 20ms}) owner.write("arm", at);
+  owner.push();
+  REQUIRE(owner.forest.revise({{"arm", along_x(2), {}}}, Time(1s) + 10ms, UINT64_MAX));
+  owner.lose();
+  owner.write("arm", 30ms);
+  owner.push();
+  owner.ask();
+  CHECK(eventually([&] { return owner.has(kArm, 1030) && owner.told_at(kArm, 1010) == 2; }));
+}
+
+TEST_CASE("watched partition: an answer that leaves edges out takes nothing back") {
+  SettledOwner owner;
+  for (const auto at : {10ms, 20ms}) {
+    owner.write("lamp", at);
+    owner.write("arm", at);
+  }
+  owner.push();
+  const std::vector<EdgeSample> past{{Time(1s) + 10ms, along_x(3)}};
+  REQUIRE(owner.forest.rewrite("lamp", {Time(1s) + 10ms, Time(1s) + 10ms}, past));
+  owner.push();
+  const PushedValues before = owner.group->snapshot(owner.forest, {}, true).value();
+  REQUIRE(before.after == before.commit);
+  REQUIRE(owner.forest.revise({{"arm", along_x(2), {}}}, Time(1s) + 20ms, UINT64_MAX));
+  owner.push();
+  owner.write("arm", 30ms);
+  owner.push();
+  (void)owner.watch.take(before, owner.now);
+  owner.write("arm", 40ms);
+  owner.push();
+  REQUIRE(eventually([&] { return owner.has(kArm, 1040); }));
+  CHECK(owner.told_at(kArm, 1020) == 2);
 }
 
 TEST_CASE("watched partition: an answer brings no earlier value of a sample back") {

@@ -268,10 +268,11 @@ TEST_CASE("drift: beyond the newest sample the error goes on from there") {
   const auto X = robot.forest.lookup("world", "base", ahead);
   REQUIRE(X);
   REQUIRE(X->covariance.complete());
-  // As long again as the interval of the samples, whose twist is wrong by what it drifted then.
+  // As long again as the interval of the samples. What it drifted then counts twice: 4 times its
+  // variance, of which the newest sample has one.
   const Matrix6d expected =
       newest->covariance.of_specified().transported(shift(0.3).inverse()).matrix() +
-      2 * testing::walked_in_steps(robot.Q.matrix(), log(shift(0.3)), kStep);
+      3 * testing::walked_in_steps(robot.Q.matrix(), log(shift(0.3)), kStep);
   const Matrix6d found = X->covariance.of_specified().matrix();
   CHECK((found - expected).norm() < 1e-9 * expected.norm());
   CHECK(X->pose.translation().x() == Approx(newest->pose.translation().x() + 0.3));
