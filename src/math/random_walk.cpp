@@ -28,7 +28,7 @@ constexpr std::array<Point, 4> kFour{{{0.06943184420297371, 0.17392742256872693}
 constexpr double kStraight = 1e-16;
 constexpr double kLittle = 0.01 * 0.01;
 constexpr double kMost = 0.2 * 0.2;
-constexpr int kMostHalvings = 5;
+constexpr int kMostHalved = 5;
 
 double series(double x, const std::array<double, 4>& terms) {
   return terms[0] + x * (terms[1] + x * (terms[2] + x * terms[3]));
@@ -76,7 +76,7 @@ Covariance walked(const Covariance& density, const Pose& increment, double secon
     Twist part = xi;
     double angle2 = xi.tail<3>().squaredNorm();
     int halvings = 0;
-    for (; angle2 > kMost && halvings < kMostHalvings; ++halvings) {
+    for (; angle2 > kMost && halvings < kMostHalved; ++halvings) {
       part *= 0.5;
       angle2 *= 0.25;
     }
