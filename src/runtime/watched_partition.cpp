@@ -237,7 +237,8 @@ void WatchedPartition::note_skipped(const Group& group, const PushedValues& answ
     const Known& known = known_[group.frames[entry.index]];
     const bool has_samples = known.newest && entry.history == known.history;
     if (known.history == 0 || (has_samples && *entry.stamp <= *known.newest)) continue;
-    const Time from = has_samples ? *known.newest : *entry.stamp - kStreamed;
+    const Time from =
+        has_samples ? *known.newest : std::max<Time>(Time(), *entry.stamp - kStreamed);
     skipped_from_ = std::min(skipped_from_.value_or(from), from);
   }
   if (skipped_from_) misses(*skipped_from_);
