@@ -105,15 +105,15 @@ class KalibrChain {
     }
     if (!camera.X_CB) begin(camera);
     if (!camera.X_CI && !camera.X_CB && before_) {
-      return fail(Errc::kInvalidInput, "has neither T_cam_imu, T_imu_cam nor T_cn_cnm1");
+      return fail(Errc::kInvalidInput, "has neither T_cam_imu nor T_cn_cnm1");
     }
     if (camera.X_CB) {
       X_first_ = *camera.X_CB * X_first_;
       if (X_I_) *X_I_ = *camera.X_CB * *X_I_;
     }
     if (camera.X_CI && X_I_ && !is_near(camera.X_CI->inverse() * *X_I_)) {
-      return fail(Errc::kInvalidInput, "T_cn_cnm1 contradicts the pose of the IMU of " +
-                                           stated_by_ + " and of " + camera.name);
+      return fail(Errc::kInvalidInput,
+                  "T_cn_cnm1 contradicts T_cam_imu of " + stated_by_ + " and of " + camera.name);
     }
     place(camera);
     before_ = camera;
