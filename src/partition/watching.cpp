@@ -314,6 +314,17 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   return pushed;
 }
 
+std::vector<const PushedValue*> first_samples(const PushedValues& values, std::size_t edges) {
+  std::vector<const PushedValue*> first;
+  std::vector<bool> seen(edges, false);
+  for (const PushedValue& entry : values.entries) {
+    if (entry.index >= edges || seen[entry.index] || !entry.stamp) continue;
+    seen[entry.index] = true;
+    first.push_back(&entry);
+  }
+  return first;
+}
+
 std::vector<PushedValues> pieces_of(PushedValues&& pushed) {
   const std::size_t most = correlated_entries(pushed) > kMaxCorrelated ? kMaxCorrelated : kMaxItems;
   const std::size_t count = std::max<std::size_t>((pushed.entries.size() + most - 1) / most, 1);

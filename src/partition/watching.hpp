@@ -115,6 +115,11 @@ class WatchedGroup {
   return values.after == 0 || values.after == values.commit;
 }
 
+/// The first sample of each edge that the values have one of, in their order.
+/// @param edges  how many edges there may be
+[[nodiscard]] std::vector<const PushedValue*> first_samples(const PushedValues& values,
+                                                            std::size_t edges);
+
 /// Splits the values into pieces that fit into a message.
 [[nodiscard]] std::vector<PushedValues> pieces_of(PushedValues&& pushed);
 

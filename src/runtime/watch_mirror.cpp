@@ -169,16 +169,13 @@ void WatchMirror::admit(const Source& source, PushedValue entry, const Message& 
 }
 
 void WatchMirror::note_skipped(const Source& source, const PushedValues& answer) {
-  std::vector<bool> seen(source.edges.size(), false);
-  for (const PushedValue& entry : answer.entries) {
-    if (entry.index >= seen.size() || seen[entry.index] || !entry.stamp) continue;
-    seen[entry.index] = true;  // its first sample
-    const std::uint32_t index = source.edges[entry.index];
+  for (const PushedValue* first : first_samples(answer, source.edges.size())) {
+    const std::uint32_t index = source.edges[first->index];
     if (index >= edges_.size() || edges_[index].history == 0) continue;
     const Edge& edge = edges_[index];
-    const bool begins = entry.history > edge.history;
+    const bool begins = first->history > edge.history;
     const Time known = begins ? Time() : edge.complete.value_or(Time());
-    if (*entry.stamp > known) skipped_from_ = std::min(skipped_from_.value_or(known), known);
+    if (*first->stamp > known) skipped_from_ = std::min(skipped_from_.value_or(known), known);
   }
 }
 

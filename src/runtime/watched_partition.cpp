@@ -229,16 +229,13 @@ void WatchedPartition::misses_recent() {
 }
 
 void WatchedPartition::note_skipped(const Group& group, const PushedValues& answer) {
-  std::vector<bool> seen(group.frames.size(), false);
-  for (const PushedValue& entry : answer.entries) {
-    if (entry.index >= seen.size() || seen[entry.index] || !entry.stamp) continue;
-    seen[entry.index] = true;  // its first sample
-    if (group.frames[entry.index] == kGone) continue;
-    const Known& known = known_[group.frames[entry.index]];
-    const bool has_samples = known.newest && entry.history == known.history;
-    if (known.history == 0 || (has_samples && *entry.stamp <= *known.newest)) continue;
+  for (const PushedValue* first : first_samples(answer, group.frames.size())) {
+    if (group.frames[first->index] == kGone) continue;
+    const Known& known = known_[group.frames[first->index]];
+    const bool has_samples = known.newest && first->history == known.history;
+    if (known.history == 0 || (has_samples && *first->stamp <= *known.newest)) continue;
     const Time from =
-        has_samples ? *known.newest : std::max<Time>(Time(), *entry.stamp - kStreamed);
+        has_samples ? *known.newest : std::max<Time>(Time(), *first->stamp - kStreamed);
     skipped_from_ = std::min(skipped_from_.value_or(from), from);
   }
   if (skipped_from_) misses(*skipped_from_);

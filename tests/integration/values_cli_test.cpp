@@ -168,13 +168,23 @@ TEST_CASE("values: a first line that is neither JSON nor names of columns is tol
   CHECK(eventually([&] { return robot.position("elbow_joint") == 0.25; }));
 }
 
+namespace {
+
+// Makes a pipe with this text in it. @return its other end, which keeps it open
+int filled_pipe(const std::string& pipe, const std::string& text) {
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+  REQUIRE(write(writer, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
+  return writer;
+}
+
+}  // namespace
+
 TEST_CASE("values: publishing a pipe ends at an interrupt and tells what was sent") {
   const Robot robot;
   const std::string pipe = robot.directory.path() + "/pipe";
-  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
-  const std::string written = "{\"edge\": \"tool0\", \"xyz\": [0, 0, 0.25]}\n{\"edge\": \"too";
-  REQUIRE(write(writer, written.data(), written.size()) == static_cast<ssize_t>(written.size()));
+  const int writer =
+      filled_pipe(pipe, "{\"edge\": \"tool0\", \"xyz\": [0, 0, 0.25]}\n{\"edge\": \"too");
   Process publish = robot.domain.start_cli({"publish", pipe});
   CHECK(eventually([&] {
     return robot.answered({"lookup", "wrist_3_link", "tool0"}).at("translation").at(2) == 0.25;
@@ -188,10 +198,7 @@ TEST_CASE("values: publishing a pipe ends at an interrupt and tells what was sen
 TEST_CASE("values: an interrupt before the first row is no error") {
   const Robot robot;
   const std::string pipe = robot.directory.path() + "/pipe";
-  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-  const int writer = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
-  const std::string names = "edge,x,y,z,qx,qy,qz,qw\n";
-  REQUIRE(write(writer, names.data(), names.size()) == static_cast<ssize_t>(names.size()));
+  const int writer = filled_pipe(pipe, "edge,x,y,z,qx,qy,qz,qw\n");
   Process publish = robot.domain.start_cli({"publish", pipe});
   CHECK(eventually([&] {
     int left = -1;

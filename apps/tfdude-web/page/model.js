@@ -11,22 +11,11 @@ export const EXACT = 0, GIVEN = 1, UNSPECIFIED = 2;
 
 export class Model {
   constructor() {
-    this.version = -1;
-    this.count = 0;
-    this.ids = [];
-    this.index = new Map();
-    this.partitions = [];
-    this.rates = {};
-    this.joints = [];
-    this.events = [];
-    this.span = null;         // [oldest, newest], BigInt ns
-    this.now = 0n;            // of the last picture
     this.root = null;         // id of the frame that all is seen from
     this.past = false;        // an instant is shown
     this.picture = 0;         // counts what arrives
-    this.chosen = null;       // what the owners say of one frame: root, frame, rows of its covariance
     this.period = 33;         // between values [ms]
-    this.allocate(0);
+    this.forget();
   }
 
   allocate(n) {
@@ -55,7 +44,7 @@ export class Model {
     this.sigmaStale = true;
   }
 
-  /** Before something else is shown, of which nothing is known yet. */
+  /** Before something is shown, of which nothing is known yet. */
   forget() {
     this.version = -1;
     this.ids = [];
@@ -64,9 +53,9 @@ export class Model {
     this.rates = {};
     this.joints = [];
     this.events = [];
-    this.span = null;
-    this.now = 0n;
-    this.chosen = null;
+    this.span = null;         // [oldest, newest], BigInt ns
+    this.now = 0n;            // of the last picture
+    this.chosen = null;       // what the owners say of one frame: root, frame, rows of its covariance
     this.allocate(0);
   }
 
