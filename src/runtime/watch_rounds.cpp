@@ -97,6 +97,7 @@ void WatchRounds::begin(Clock::time_point now) {
     ++period_;
   }
   all_ = drop_unused();
+  attended_.clear();
   turns_.clear();
   turn_ = 0;
   for (const auto& entry : all_) {
@@ -136,6 +137,7 @@ void WatchRounds::attend(Clock::time_point now, WatchLink& link) {
   hears_all_ = true;
   asked_again_ = false;
   for (const Watched::Group& group : groups_) {
+    attended_.insert(group.id);
     if (open_.contains(group.id)) continue;
     if (auto opened = link.open(group.part.partition, group.id); opened) {
       open_.insert(group.id, now);
@@ -190,7 +192,8 @@ void WatchRounds::answered(Clock::time_point now) {
 }
 
 void WatchRounds::close_unused(Clock::time_point now, WatchLink& link) {
-  std::set<std::uint64_t> used;
+  // Also those of a path that an owner denies: they are asked for again soon.
+  std::set<std::uint64_t> used = std::exchange(attended_, {});
   for (const auto& entry : all_) used.merge(entry->watched->groups(now));
   for (const std::uint64_t group : open_.take_unused(used, now)) link.close(group);
 }

@@ -112,7 +112,8 @@ class WatchRounds {
   std::uint64_t period_ = 0;
   Entries all_;
   std::vector<Turn> turns_;
-  std::size_t turn_ = 0;  // the current one
+  std::size_t turn_ = 0;              // the current one
+  std::set<std::uint64_t> attended_;  // groups of the round
   // Of the current turn:
   std::vector<Watched::Group> groups_;
   std::vector<Part> parts_;

@@ -35,10 +35,6 @@ class Follower final : public Actor {
   [[nodiscard]] std::string tip() const { return id("tip"); }
   [[nodiscard]] bool watches() const { return watch_ != nullptr; }
   [[nodiscard]] Result<StampedTransform> read() const;
-  /// The groups of watchers that it belongs to.
-  [[nodiscard]] std::set<std::uint64_t> groups() const {
-    return watch_ != nullptr ? watch_->groups({}) : std::set<std::uint64_t>();
-  }
 
  private:
   /// One value of both edges.

@@ -172,6 +172,7 @@ class Process : public std::enable_shared_from_this<Process>,
   /// Calls that have not ended, and changes that wait to be stored.
   [[nodiscard]] std::size_t open_calls() const;
   [[nodiscard]] const std::set<std::uint64_t>& pushed_groups() const { return pushed_groups_; }
+  [[nodiscard]] const Watches& watches() const { return watches_; }
   /// id, parent and partition of each frame whose owner is reachable; sorted.
   /// @param except  partitions that are left out
   [[nodiscard]] std::vector<std::string> structure(const std::set<std::string>& except) const;

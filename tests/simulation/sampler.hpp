@@ -32,10 +32,6 @@ class Sampler final : public Actor {
   /// The watch must have every sample that the owner has, of those in order that were sent since it
   /// began: an owner does not repeat late ones whose push was lost.
   void check_watch(const Forest& owner);
-  /// The groups of watchers that it belongs to.
-  [[nodiscard]] std::set<std::uint64_t> groups() const {
-    return watch_ != nullptr ? watch_->groups({}) : std::set<std::uint64_t>();
-  }
 
  private:
   void step() override;

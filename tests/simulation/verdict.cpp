@@ -131,8 +131,12 @@ void Verdict::check_kept_by_owner(Process& owner) {
     if (listed.count(id) > 0) grows(" lists " + id + " and its tombstone");
   }
   std::set<std::uint64_t> watched;
-  for (const auto& follower : cast_.followers) watched.merge(follower->groups());
-  for (const auto& sampler : cast_.samplers) watched.merge(sampler->groups());
+  const auto watches = [&](Process& process) {
+    const std::set<std::uint64_t>& opened = process.watches().opened();
+    watched.insert(opened.begin(), opened.end());
+  };
+  for (const auto& follower : cast_.followers) watches(follower->process());
+  for (const auto& sampler : cast_.samplers) watches(sampler->process());
   for (const std::uint64_t group : owner.pushed_groups()) {
     if (watched.count(group) == 0) grows(" pushes to a group that nobody watches");
   }

@@ -34,6 +34,9 @@ class Watches : private WatchLink {
   /// @param from  the process that has pushed it; @param number  it counts what it pushes
   void on_pushed(std::uint64_t from, std::uint64_t number, const PushedValues& pushed);
 
+  /// The groups that it listens to, also those of a path that an owner denies for now.
+  [[nodiscard]] const std::set<std::uint64_t>& opened() const { return opened_; }
+
  private:
   using Clock = WatchRounds::Clock;
 
