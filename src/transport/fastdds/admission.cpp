@@ -24,6 +24,7 @@ void Admission::discovered(const PeerId& peer, const Announcement& said) {
   std::string reason = said.is_ours ? reason_against(said) : std::string();
   if (reason.empty() && (authority_.empty() || verified_.count(peer) != 0)) return met_(peer, said);
   candidates_.insert_or_assign(peer, Candidate{said, std::move(reason)});
+  note_awaited();
 }
 
 void Admission::authenticated(const PeerId& peer, bool verified) {
@@ -35,9 +36,11 @@ void Admission::authenticated(const PeerId& peer, bool verified) {
     const Announcement said = known->second.said;
     candidates_.erase(known);
     met_(peer, said);
+    note_awaited();  // only now: in between it is neither awaited nor met
   } else if (known != candidates_.end() && known->second.excluded_because.empty()) {
     known->second.excluded_because =
         "and this participant do not accept each other's keys: one of them is expired or revoked";
+    note_awaited();
     log().warn("partition {} {}", quote(known->second.said.partition),
                known->second.excluded_because);
   }
@@ -47,11 +50,11 @@ void Admission::left(const PeerId& peer) {
   const Lock lock(mutex_);
   candidates_.erase(peer);
   verified_.erase(peer);
+  note_awaited();
 }
 
-bool Admission::awaits_authentication() const {
-  const Lock lock(mutex_);
-  return std::any_of(candidates_.begin(), candidates_.end(), [](const auto& candidate) {
+void Admission::note_awaited() {
+  awaited_ = std::any_of(candidates_.begin(), candidates_.end(), [](const auto& candidate) {
     return !candidate.second.said.partition.empty() && candidate.second.excluded_because.empty();
   });
 }

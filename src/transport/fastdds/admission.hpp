@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <map>
 #include <set>
@@ -31,8 +32,9 @@ class Admission {
   void authenticated(const PeerId& peer, bool verified);
   void left(const PeerId& peer);
 
-  /// Whether an owner was discovered that has yet to be authenticated.
-  [[nodiscard]] bool awaits_authentication() const;
+  /// Whether an owner was discovered that has yet to be authenticated. Takes no lock: it is asked
+  /// while a message is received, too.
+  [[nodiscard]] bool awaits_authentication() const { return awaited_; }
 
   /// The owners that are excluded: a sentence each.
   [[nodiscard]] std::vector<std::string> excluded() const;
@@ -43,12 +45,14 @@ class Admission {
     std::string excluded_because;  // empty: it may still be met
   };
   [[nodiscard]] std::string reason_against(const Announcement& said) const;
+  void note_awaited() TFDUDE_REQUIRES(mutex_);
 
   const std::function<void(const PeerId&, const Announcement&)> met_;
   std::string authority_;  // set once, before anybody is discovered
   mutable Mutex mutex_{LockRank::kAnnouncing};
   std::map<PeerId, Candidate> candidates_ TFDUDE_GUARDED_BY(mutex_);
   std::set<PeerId> verified_ TFDUDE_GUARDED_BY(mutex_);
+  std::atomic<bool> awaited_{false};
 };
 
 }  // namespace tfdude::fastdds

@@ -76,10 +76,10 @@ class FastDdsTransport final : public Transport {
   void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
   Result<void> publish_clock(Time now) override;
   bool discovered() const override {
-    return peers_.discovered() && !admission_.awaits_authentication();
+    return !admission_.awaits_authentication() && peers_.discovered();
   }
   bool awaits_presence() const override {
-    return peers_.awaits_presence() || admission_.awaits_authentication();
+    return admission_.awaits_authentication() || peers_.awaits_presence();
   }
   std::vector<std::string> excluded() const override { return admission_.excluded(); }
   std::uint64_t dropped() const override { return fair_share_->dropped(); }

@@ -1,5 +1,8 @@
 #include "transport/fastdds/admission.hpp"
 
+#include <vector>
+
+#include "base/mutex.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude::fastdds {
@@ -84,6 +87,29 @@ TEST_CASE("admission: clients and other programs are excluded in silence") {
   CHECK(door.met == 0);
   CHECK(door.admission.excluded().empty());
   CHECK_FALSE(door.admission.awaits_authentication());
+}
+
+// Lock ranks are checked without NDEBUG.
+TEST_CASE("admission: whether somebody is awaited can be asked while a message is received") {
+  Door door("1");
+  door.admission.discovered(kPeer, owner_of("arm", "1"));
+  Mutex receiving(LockRank::kReceiving);
+  const Lock lock(receiving);
+  CHECK(door.admission.awaits_authentication());
+}
+
+TEST_CASE("admission: who is met is awaited until the callback has ended") {
+  Admission* asked = nullptr;
+  std::vector<bool> awaited;
+  Admission admission{[&](const PeerId&, const Announcement&) {
+    awaited.push_back(asked->awaits_authentication());
+  }};
+  asked = &admission;
+  admission.configure("1");
+  admission.discovered(kPeer, owner_of("arm", "1"));
+  admission.authenticated(kPeer, true);
+  CHECK(awaited == std::vector<bool>{true});
+  CHECK_FALSE(admission.awaits_authentication());
 }
 
 }  // namespace
