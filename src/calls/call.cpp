@@ -77,14 +77,13 @@ void Call::replied(Clock::time_point now) {
 
 void Call::note_changes(const std::vector<Reply>& replies) {
   const std::vector<Part>& parts = task_.parts();
-  own_.reset();
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const Reply& reply = replies[i];
     if (std::holds_alternative<Error>(reply.body)) continue;
     if (parts[i].owner != kHeldHere) {
       changes_.push_back({parts[i].owner, parts[i].partition, reply.epoch, reply.lamport_time});
-    } else if (is_of_structure(parts[i].request)) {
-      own_ = i;
+    } else if (is_stored_first(parts[i].request)) {
+      own_ = true;
     }
   }
 }
@@ -111,15 +110,14 @@ bool Call::confirm(Directory& directory, Clock::time_point now) {
 }
 
 void Call::stored_or_none(Clock::time_point now) {
-  if (!own_) return judge(now);
+  // An observation stores its part here once all owners have theirs, or none.
+  if (!own_ || (taken_ && *taken_ == Task::Next::kAsk)) return judge(now);
   state_ = State::kStore;
   until_ = limit_.at();
 }
 
-const Request& Call::stored_change() const { return task_.parts()[*own_].request; }
-
 void Call::stored(Result<void> stored, Clock::time_point now) {
-  own_.reset();
+  own_ = false;
   if (!stored && taken_) taken_ = tl::unexpected(std::move(stored.error()));
   judge(now);
 }

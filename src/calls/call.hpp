@@ -78,7 +78,7 @@ class Call {
     kDiscover,  ///< wait for news, a moment at most, then resume()
     kAsk,       ///< step requests() until they are complete, then replied()
     kConfirm,   ///< confirm(), with each change of the structure, until it returns true
-    kStore,     ///< wait until stored_change() is stored, then stored()
+    kStore,     ///< wait until the changes made here are stored, then stored()
     kPause,     ///< wait until(), or until awaits() is no longer the version, then resume()
     kOver,      ///< outcome()
   };
@@ -116,7 +116,6 @@ class Call {
   [[nodiscard]] bool outdates() const { return outdates_; }
 
   // ---- kStore
-  [[nodiscard]] const Request& stored_change() const;
   void stored(Result<void> stored, Clock::time_point now);
 
   // ---- kPause
@@ -164,7 +163,7 @@ class Call {
   std::optional<PendingRequests> requests_;
   Result<Task::Next> taken_ = Task::Next::kDone;
   std::vector<Change> changes_;
-  std::optional<std::size_t> own_;  // a part held here that must be stored
+  bool own_ = false;  // a change was made here that must be stored
   std::vector<std::string> late_;
   bool outdates_ = false;
   int attempts_ = 0;

@@ -27,6 +27,10 @@ bool is_of_structure(const Request& request) {
   return is_one_of<AddRequest, RemoveRequest, ForgetRequest, MoveRequest>(request);
 }
 
+bool is_stored_first(const Request& request) {
+  return is_of_structure(request) || is_one_of<CorrelateRequest, ReviseRequest>(request);
+}
+
 bool is_of_values(const Request& request) {
   return is_one_of<UpdateRequest, PartialUpdateRequest, JointUpdate, ReviseRequest, RewriteRequest>(
       request);

@@ -16,6 +16,10 @@ namespace tfdude {
 /// Whether a request changes the set of frames or their parents.
 [[nodiscard]] bool is_of_structure(const Request& request);
 
+/// Whether a change by the owner's own process is stored before the call returns: one of the
+/// structure, or of what edges have in common. Other owners may have stored their part of that.
+[[nodiscard]] bool is_stored_first(const Request& request);
+
 /// Whether a request changes values only.
 [[nodiscard]] bool is_of_values(const Request& request);
 

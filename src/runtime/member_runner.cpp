@@ -239,9 +239,8 @@ void MemberRunner::tell(const Deadline& deadline) {
   if (commits_ && commits_->pending()) (void)commits_->flush(deadline.at());
 }
 
-Result<void> MemberRunner::await_stored(const Request& request, const Deadline& deadline) {
-  return is_of_structure(request) && commits_->stores() ? commits_->flush(deadline.at())
-                                                        : Result<void>();
+Result<void> MemberRunner::await_stored(const Deadline& deadline) {
+  return commits_->stores() ? commits_->flush(deadline.at()) : Result<void>();
 }
 
 bool MemberRunner::responds(const Deadline& deadline) {

@@ -116,7 +116,7 @@ class MemberRunner final : private CommitLoop::Effects {
   /// Announces changes made here to others.
   void tell(const Deadline& deadline);
   /// Waits until the changes of a request are stored here, if required.
-  [[nodiscard]] Result<void> await_stored(const Request& request, const Deadline& deadline);
+  [[nodiscard]] Result<void> await_stored(const Deadline& deadline);
   /// Whether the loop that stores and announces changes does a round in time, failed or not.
   [[nodiscard]] bool responds(const Deadline& deadline);
   /// While a change of an own frame is not stored, neither its existence nor its absence is

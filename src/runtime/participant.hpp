@@ -133,9 +133,8 @@ class Participant final : public TransportHandler,
     return memory_.read(request);
   }
   void announce_changes(const Deadline& deadline) override { member_.tell(deadline); }
-  [[nodiscard]] Result<void> await_stored(const Request& request,
-                                          const Deadline& deadline) override {
-    return member_.await_stored(request, deadline);
+  [[nodiscard]] Result<void> await_stored(const Deadline& deadline) override {
+    return member_.await_stored(deadline);
   }
   [[nodiscard]] Result<void> check_owns_partition() override {
     return member_.check_owns_partition();

@@ -71,7 +71,7 @@ void Requests::go_on(Call& call, Task& task, const Deadline& deadline) {
     case Call::State::kConfirm:
       return confirm(call, deadline);
     case Call::State::kStore:
-      return call.stored(own_.await_stored(call.stored_change(), deadline), Clock::now());
+      return call.stored(own_.await_stored(deadline), Clock::now());
     case Call::State::kPause:
       pause(call);
       return call.resume();

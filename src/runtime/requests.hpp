@@ -29,9 +29,8 @@ class OwnPartition {
   }
   /// Announces changes made here to others, which are asked to build on them.
   virtual void announce_changes(const Deadline& deadline) = 0;
-  /// Waits until the changes of a request are stored here, if required.
-  [[nodiscard]] virtual Result<void> await_stored(const Request& request,
-                                                  const Deadline& deadline) = 0;
+  /// Waits until all changes made here are stored, if they are to be.
+  [[nodiscard]] virtual Result<void> await_stored(const Deadline& deadline) = 0;
   /// @return kPartitionTaken if it has given up its partition.
   [[nodiscard]] virtual Result<void> check_owns_partition() = 0;
 };

@@ -6,6 +6,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/bytes.hpp"
+#include "math/flat.hpp"
 
 namespace tfdude {
 
@@ -94,7 +95,7 @@ Result<void> read_observed(const std::string& blob, StoredCorrelation& correlati
   Eigen::Vector3d translation;
   for (double& number : rotation.coeffs()) number = in.f64();
   for (double& number : translation) number = in.f64();
-  const auto given = Pose::create(rotation, translation);
+  const auto given = computed_pose(rotation, translation);
   if (!given) return fail_at("the pose as it was given", given.error());
   correlation.given = *given;
   return {};

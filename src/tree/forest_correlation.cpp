@@ -56,6 +56,18 @@ void Forest::Impl::unlink(const HeldVersion& edge, const std::vector<std::string
   }
 }
 
+Result<void> Forest::Impl::check_room(const HeldVersion& edge, const Correlation& said) {
+  if (edge.correlation == nullptr || !edge.correlation->revised()) return {};
+  const auto& before = edge.correlation->now().common_errors;
+  const auto observed =
+      static_cast<std::size_t>(std::count_if(before.begin(), before.end(), is_observed));
+  if (said.common_errors.size() + observed <= kMaxCommonErrors) return {};
+  return fail(Errc::kInvalidInput, std::to_string(said.common_errors.size()) + " sources and " +
+                                       std::to_string(observed) +
+                                       " errors left by observations, of at most " +
+                                       std::to_string(kMaxCommonErrors) + " together");
+}
+
 // What observations have found stays: the edge's error is no more certain because less is said of
 // its sources.
 void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) {
@@ -79,6 +91,9 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
   const Writing lock(impl_->mutex_);
   const auto slot = impl_->frames_.held_slot(id);
   if (!slot) return tl::unexpected(slot.error());
+  if (auto ok = impl_->check_room(impl_->frames_.newest_value(*slot), correlation); !ok) {
+    return fail_at("frame " + quote(id), ok.error());
+  }
   impl_->say_correlation(*slot, correlation);
   impl_->commit();
   return {};

@@ -209,7 +209,9 @@ class Forest::Impl {
   /// @param until  not included
   void untie_samples(std::uint32_t slot, std::int64_t from, std::int64_t until)
       TFDUDE_REQUIRES(mutex_);
-  /// Pushes the newest value again, with another correlation.
+  /// Whether what is said fits beside what observations have left.
+  [[nodiscard]] static Result<void> check_room(const HeldVersion& edge, const Correlation& said);
+  /// Pushes the newest value again, with another correlation, for which there is room.
   void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen)

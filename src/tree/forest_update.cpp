@@ -217,9 +217,11 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
     const HeldVersion* edge = frames_.newest_held(update.*frame);
     if (edge == nullptr) return tl::unexpected(frames_.held_slot(update.*frame).error());
     if (!is_finite(update.X_PC)) return check_value(edge->name->text, update.X_PC);
-    if (auto ok = check_said(update); !ok) {
-      return fail_at("frame " + quote(edge->name->text), ok.error());
-    }
+    auto ok = check_said(update);
+    // Other edges lose with a new value what observations have left.
+    const Correlation* said = correlation_of(update);
+    if (ok && said != nullptr && drifts(*edge)) ok = check_room(*edge, *said);
+    if (!ok) return fail_at("frame " + quote(edge->name->text), ok.error());
     to_update_.push_back(edge);
   }
   const auto at = stamp_for(to_update_.data(), to_update_.size(), stamp);

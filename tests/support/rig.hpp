@@ -97,9 +97,8 @@ class Rig : private OwnPartition {
  private:
   [[nodiscard]] Reply answer_own(const Request& request) override { return member.answer(request); }
   void announce_changes(const tfdude::Deadline& deadline) override { member.tell(deadline); }
-  [[nodiscard]] Result<void> await_stored(const Request& request,
-                                          const tfdude::Deadline& deadline) override {
-    return member.await_stored(request, deadline);
+  [[nodiscard]] Result<void> await_stored(const tfdude::Deadline& deadline) override {
+    return member.await_stored(deadline);
   }
   [[nodiscard]] Result<void> check_owns_partition() override {
     return owns_partition ? owns_partition() : member.check_owns_partition();

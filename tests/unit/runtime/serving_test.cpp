@@ -211,6 +211,37 @@ TEST_CASE("member runner: an owner's own updates do not wait for the disk") {
   if (structural) CHECK(outcome(change.get()) == "ok");
 }
 
+TEST_CASE("member runner: an owner's own observation and correlation return once they are stored") {
+  const bool observes = GENERATE(false, true);
+  LoopbackNetwork network;
+  Disk disk;
+  OwnerRig owner(network.join());
+  owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
+  owner.member.open(std::make_unique<SlowStore>(disk), 1h);
+  const StoredState nothing;
+  REQUIRE(owner.member.serve(&nothing, kArm));
+  REQUIRE(owner.member.publish_all());
+  disk.let_it_stand_still(true);
+  Request request{1, "hand", CorrelateRequest{{true, {}, {}}}};
+  if (observes) {
+    const Revision revision{"hand", along_x(5), {}};
+    request.body = ReviseRequest{{{"hand", {1, 1, 1}, false, revision}},
+                                 {},
+                                 owner.structure.forest.newest_commit(),
+                                 owner.member.incarnation()};
+  }
+  auto change = std::async(std::launch::async, [&] {
+    return owner.requests.change(Deadline(20s), {}, [&](const Directory&) -> Result<Part> {
+      return Part{kHeldHere, "arm", request};
+    });
+  });
+  const bool waited = eventually([&] { return disk.is_waited_for(); });
+  CHECK(change.wait_for(20ms) == std::future_status::timeout);
+  disk.let_it_stand_still(false);
+  CHECK(waited);
+  CHECK(outcome(change.get()) == "ok");
+}
+
 TEST_CASE("member runner: ignored messages of a process are logged once") {
   const CapturedLog logged;
   LoopbackNetwork network;

@@ -38,8 +38,14 @@ std::string any_id(Random& random, std::size_t number) {
          std::to_string(number);
 }
 
-Transform any_transform(Random& random) {
+// A computed pose may be beyond what can be stated.
+Pose any_pose(Random& random) {
   const Pose pose = random.pose(one_of<double>(random, {1e-300, 1.0, 9e8}));
+  return random.index(2) == 0 ? pose : pose * random.pose(9e8);
+}
+
+Transform any_transform(Random& random) {
+  const Pose pose = any_pose(random);
   if (random.index(3) == 0) return {pose, StatedCovariance::unspecified()};
   Covariance covariance;
   if (random.index(2) == 0) covariance = random.transform().covariance.of_specified();
@@ -67,6 +73,11 @@ StateChange any_change(Random& random) {
           {{any_id(random, 7), false,
             Loading::Constant(6, 2, one_of<double>(random, {0.0, -1e9, 1e9, 5e-324}))}},
           {any_id(random, 8)}};
+    }
+    if (random.index(3) == 0) {
+      frame.correlation.observed = {
+          false, {{any_id(random, 9), false, Loading::Constant(6, 1, 1e-9)}}, {any_id(random, 10)}};
+      if (random.index(2) == 0) frame.correlation.given = any_pose(random);
     }
     change.configured->push_back({frame.id, frame.parent, frame.X_PC});
     change.frames.push_back(std::move(frame));
@@ -119,10 +130,14 @@ TEST_CASE("whatever rows a process writes, it can read them again") {
       CHECK(read.time.stamp == written->time.stamp);
       CHECK(read.time.cleared == written->time.cleared);
       CHECK(read.correlation.said == written->correlation.said);
+      CHECK(read.correlation.observed == written->correlation.observed);
+      REQUIRE(read.correlation.given.has_value() == written->correlation.given.has_value());
       // The quaternion is normalized once more.
       const Flat a = to_flat(read.X_PC);
       const Flat b = to_flat(written->X_PC);
-      for (std::size_t i = 0; i < a.size(); ++i) CHECK(std::abs(a[i] - b[i]) <= 1e-15);
+      for (std::size_t i = 0; i < a.size(); ++i) {
+        CHECK(std::abs(a[i] - b[i]) <= 1e-15 * std::max(1.0, std::abs(b[i])));
+      }
     }
   }
 }

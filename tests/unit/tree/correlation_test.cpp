@@ -329,6 +329,28 @@ TEST_CASE("An invalid correlation or revision is rejected and changes nothing") 
   CHECK(transform_diff(*X_WA, robot.X_WA, 0) == "");
 }
 
+TEST_CASE("Sources that do not fit beside what an observation has left are rejected") {
+  Random random(660);
+  Robot robot(random);
+  const CommonError left = common_error(random, std::string(kObservedPrefix) + "arm.1");
+  REQUIRE(robot.forest.revise({{"a", random.transform(), shared(left)}}, std::nullopt, 1'000'000));
+  Correlation said;
+  for (std::size_t i = 0; i < kMaxCommonErrors; ++i) {
+    said.common_errors.push_back(common_error(random, "s" + std::to_string(i)));
+  }
+  const auto refused = robot.forest.correlate("a", said);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kInvalidInput);
+  CHECK_THAT(refused.error().message,
+             ContainsSubstring("'a'") && ContainsSubstring("128 sources and 1 "));
+  said.common_errors.pop_back();
+  REQUIRE(robot.forest.correlate("a", said));
+  const auto kept = robot.forest.kept("a");
+  REQUIRE(kept);
+  REQUIRE(kept->correlation.observed);
+  CHECK(kept->correlation.observed->common_errors.size() == kMaxCommonErrors);
+}
+
 TEST_CASE("Pushed values of an edge have its correlation") {
   Random random(659);
   Robot robot(random);
