@@ -113,7 +113,10 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
         spdlog::error("partition {}: {}", tfdude::quote(config->partition), line);
       }
     }
-    return code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ? kWrongUsage : kRejected;
+    // Another start would not help. A configuration may be invalid only beside the stored state.
+    const bool is_wrong = code == tfdude::Errc::kConfig || code == tfdude::Errc::kState ||
+                          code == tfdude::Errc::kInvalidInput || code == tfdude::Errc::kCycle;
+    return is_wrong ? kWrongUsage : kRejected;
   }
   if (const auto line = tfdude::daemon::unspecified_edges(*config); !line.empty()) {
     spdlog::info("partition {}: {}", tfdude::quote(config->partition), line);

@@ -80,6 +80,14 @@ std::optional<Reply> Member::on_request(const PeerId& from, const Request& reque
     reply = {request.sequence, 0, Error{Errc::kNotOwner, given_up_}};
   } else if (changes && rejection) {
     reply = partition_->refuse(from, request, *rejection, now);
+  } else if (changes && replies_.size() >= ReplyCache::kReplies) {
+    // A disk that hangs reports nothing. More would also be more than is kept for repetitions.
+    if (replies_.count({from, request.sequence}) != 0) return std::nullopt;
+    return partition_->refuse(from, request,
+                              {Errc::kTooMuch, "partition " + quote(presence_.partition) + " has " +
+                                                   std::to_string(replies_.size()) +
+                                                   " changes that wait for its disk, the limit"},
+                              now);
   } else {
     reply = partition_->answer(from, request, now);
     look_for_contests();

@@ -123,8 +123,11 @@ Result<void> Partition::reconfigure(const StoredState& state,
   for (const ConfiguredChange& change : configured_changes(state, configured)) {
     const std::string& id = change.frame;
     switch (change.kind) {
-      case Kind::kAdd:
       case Kind::kReplace:
+        // Another partition has it by now: it was yielded, and that was told.
+        if (const auto there = forest_.info(id); there && there->owner != kHeldHere) break;
+        [[fallthrough]];
+      case Kind::kAdd:
         fresh.push_back(as_left(*entries.at(id), joints));
         // The new parent may come later: a missing one is allowed here, as for loaded frames.
         release(id);
@@ -212,7 +215,9 @@ bool Partition::yield(const PendingYield& pending, Time now) {
       return true;
     case PendingYield::Kind::kRemove:
       // As of the rival's removal: it must not end what others have claimed since.
-      if (auto removed = forest_.remove(pending.frame)) forget(*removed, pending.removed_at);
+      if (auto removed = forest_.remove(pending.frame, pending.removed_at)) {
+        forget(*removed, pending.removed_at);
+      }
       return true;
     case PendingYield::Kind::kConcede:
       break;

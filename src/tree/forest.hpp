@@ -123,8 +123,11 @@ class Forest {
 
   /// Removes a held frame, and all held frames below it that are reached through held ones.
   /// O(removed).
+  /// @param before  frames below that were added or moved at this Lamport time or later stay, with
+  ///   all below them, and wait for another frame with the id of their parent
   /// @return the removed ids; kUnknownFrame, kNotOwner.
-  [[nodiscard]] Result<std::vector<std::string>> remove(std::string_view id);
+  [[nodiscard]] Result<std::vector<std::string>> remove(std::string_view id,
+                                                        std::uint64_t before = UINT64_MAX);
 
   /// Removes one held frame only; frames below it wait for another frame with its id. O(subtree).
   /// @return kUnknownFrame, kNotOwner.

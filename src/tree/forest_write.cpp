@@ -147,12 +147,14 @@ Result<void> Forest::add(std::string_view id, std::string_view parent, const Tra
   return {};
 }
 
-Result<std::vector<std::string>> Forest::remove(std::string_view id) {
+Result<std::vector<std::string>> Forest::remove(std::string_view id, std::uint64_t before) {
   const Writing lock(impl_->mutex_);
   const auto top = impl_->frames_.held_slot(id);
   if (!top) return tl::unexpected(top.error());
-  const auto slots = impl_->graph_.subtree(
-      *top, [&](std::uint32_t child) { return impl_->frames_.newest(child).held(); });
+  const auto slots = impl_->graph_.subtree(*top, [&](std::uint32_t child) {
+    const Version& version = impl_->frames_.newest(child);
+    return version.held() && version.name->lamport_time.load(std::memory_order_relaxed) < before;
+  });
   std::vector<std::string> removed;
   removed.reserve(slots.size());
   for (const std::uint32_t slot : slots) {

@@ -54,6 +54,27 @@ const Error kFull{Errc::kState, "the disk is full"};
 
 }  // namespace
 
+TEST_CASE("member: while a disk hangs a bounded number of changes wait for it") {
+  Serving arms;
+  const auto update = [&](std::uint32_t number) {
+    return arms.ask(number, "arm", UpdateRequest{{{"arm", along_x(number)}}});
+  };
+  std::uint32_t number = 0;
+  bool all_wait = true;
+  while (number < ReplyCache::kReplies) all_wait = !update(++number) && all_wait;
+  CHECK(all_wait);
+  CHECK_FALSE(update(number));
+  const auto rejected = update(++number);
+  REQUIRE(rejected);
+  const auto* error = std::get_if<Error>(&rejected->body);
+  REQUIRE(error != nullptr);
+  CHECK(error->code == Errc::kTooMuch);
+  CHECK_THAT(error->message, testing::ContainsSubstring("'arms' has 65536 changes that wait"));
+  CHECK(testing::x_of(arms.forest.value("arm")) == ReplyCache::kReplies);
+  CHECK(arms.member.take_ready().replies.size() == ReplyCache::kReplies);
+  CHECK_FALSE(update(++number));
+}
+
 TEST_CASE("member: an owner that returns changes plans, whichever of its messages comes first") {
   const bool page_first = GENERATE(true, false);
   CAPTURE(page_first);

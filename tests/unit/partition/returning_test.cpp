@@ -97,6 +97,20 @@ TEST_CASE("a frame whose parent was removed while its owner was away is removed 
     tools.start();
     CHECK(tools.structure().size() == 2);
   }
+  SECTION("not what was attached below it after the removal") {
+    tools.start();
+    const auto finger = tools.forest.info("finger");
+    REQUIRE(finger);
+    REQUIRE(tools.ask("nail", AddRequest{"finger", along_x(1)}) == "ok");
+    REQUIRE(tools.ask("ring", AddRequest{"finger", along_x(1)}) == "ok");
+    REQUIRE(tools.ask("stone", AddRequest{"ring", along_x(1)}) == "ok");
+    tools.directory.apply(page_with(
+        "arms", {}, {{"flange", finger->lamport_time + 1, Tombstone::Kind::kRemoved, {}}}));
+    CHECK(tools.yield());
+    CHECK(tools.structure() == Lines{"nail < finger @ tools", "ring < finger @ tools",
+                                     "stone < ring @ tools, attached"});
+    CHECK_FALSE(tools.yield());
+  }
 }
 
 TEST_CASE("a removal has a later Lamport time than all that its client knew") {
@@ -151,6 +165,12 @@ TEST_CASE("a returning partition yields to a reachable one but not to a lost one
     arms.directory.apply(page_with("head", {{"camera", "", 1100}}));
     arms.start();
     CHECK(arms.structure() == Lines{"camera <  @ head"});
+    CHECK(arms.conflicts().size() == 1);
+  }
+  SECTION("also if its entry has been edited meanwhile") {
+    arms.directory.apply(page_with("head", {{"camera", "", 900}}));
+    arms.start({{"camera", "", along_x(7)}, {"lamp", "", along_x(1)}});
+    CHECK(arms.structure() == Lines{"camera <  @ head", "lamp <  @ arms"});
     CHECK(arms.conflicts().size() == 1);
   }
   SECTION("the other partition is lost") {
