@@ -77,14 +77,23 @@ std::set<Owner> WatchRounds::owners_in_memory() const {
 }
 
 WatchRounds::Entries WatchRounds::drop_unused() {
-  Entries unused;  // destroyed without the lock, with their callbacks
-  const Lock lock(mutex_);
-  const auto first = std::stable_partition(entries_.begin(), entries_.end(), [](const auto& entry) {
-    return entry->watched.use_count() > 1;
-  });
-  unused.assign(first, entries_.end());
-  entries_.erase(first, entries_.end());
-  return entries_;
+  Entries used;
+  Entries unused;  // destroyed without the lock
+  {
+    const Lock lock(mutex_);
+    const auto first =
+        std::stable_partition(entries_.begin(), entries_.end(),
+                              [](const auto& entry) { return entry->watched.use_count() > 1; });
+    unused.assign(first, entries_.end());
+    entries_.erase(first, entries_.end());
+    used = entries_;
+  }
+  // A function of the user may hold the last client. That cannot end on the thread of rounds, for
+  // which it waits.
+  for (const auto& entry : unused) {
+    if (const auto line = entry->watched->calls_on()) line->post([entry] {});
+  }
+  return used;
 }
 
 void WatchRounds::begin(Clock::time_point now) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "partition/messages.hpp"
 #include "partition/routing.hpp"
+#include "runtime/callbacks.hpp"
 
 namespace tfdude {
 
@@ -51,6 +53,8 @@ class Watched {
   virtual bool take(const PushedValues& pushed, Clock::time_point now) = 0;
   /// Nothing comes any more, as the client has ended.
   virtual void end() = 0;
+  /// Where functions of the user are called, which are destroyed with this; null: it has none.
+  [[nodiscard]] virtual std::shared_ptr<Callbacks::Line> calls_on() const { return nullptr; }
   /// Whether pushed values suffice for this lookup.
   [[nodiscard]] virtual bool can_answer(const std::string& /*a*/, const std::string& /*b*/,
                                         const Query& /*query*/) const {

@@ -47,6 +47,9 @@ class WatchedPartition final : public Watched {
 
   bool take(const PushedValues& pushed, Clock::time_point now) override;
   /// The listener is not running and will not run, unless it calls this itself.
+  [[nodiscard]] std::shared_ptr<Callbacks::Line> calls_on() const override {
+    return *listener_ ? line_->another() : nullptr;
+  }
   void end() override { line_->close(); }
 
   // --- for the rounds, from one thread ---

@@ -209,14 +209,22 @@ bool WatchedPath::swap_if_ready(Clock::time_point now) {
   if (followed_ != nullptr) {
     if (next_->is_behind(*followed_)) return false;
   }
-  const bool may_wait = live() && now - next_since_ < kWaitForCommon;
-  if (may_wait && lacks_common(next_->lookup({}))) return false;
+  if (live() && now - next_since_ < kWaitForCommon) {
+    const auto newest = next_->lookup({});
+    if (lacks_common(newest) || is_behind_memory(newest)) return false;
+  }
   const bool same = route_in_memory_ && route_in_memory_->is_same(next_->route());
   show(std::move(next_));
   memory_.store(nullptr, std::memory_order_seq_cst);
   route_in_memory_.reset();
   remember_newest();
   return std::exchange(was_shown_, true) && !same;
+}
+
+// What was read in memory may be ahead of what was told.
+bool WatchedPath::is_behind_memory(const Result<StampedTransform>& told) const {
+  return in_memory() && told && told->stamp &&
+         nanoseconds(*told->stamp) < latest_read_.load(std::memory_order_relaxed);
 }
 
 void WatchedPath::show(std::unique_ptr<WatchMirror> mirror) {

@@ -92,6 +92,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   bool take(const PushedValues& pushed, Clock::time_point now) override;
   /// After it has returned, no memory of others is read.
   void end() override;
+  [[nodiscard]] std::shared_ptr<Callbacks::Line> calls_on() const override {
+    return options_.on_route ? routes_ : nullptr;
+  }
   Looked look(Clock::time_point now) override;
   [[nodiscard]] std::set<Owner> owners_in_memory() const override;
   [[nodiscard]] bool can_answer(const std::string& a, const std::string& b,
@@ -175,6 +178,8 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   void set_health(Result<void> health);
   void report(std::string what);
   void report_rerouted();
+  [[nodiscard]] bool is_behind_memory(const Result<StampedTransform>& told) const
+      TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool swap_if_ready(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
   /// Null: nothing, unless it is read in memory.
   void show(std::unique_ptr<WatchMirror> mirror) TFDUDE_REQUIRES(mutex_);

@@ -117,15 +117,20 @@ Watched::Looked WatchedPath::look(Clock::time_point now) {
       return {};
     }
     if (written == written_) return {};
-    if (now < tell_from_) return {false, tell_from_};
+    auto newest = memory->lookup_kept(a_, b_, {});
+    const bool goes_back = newest && newest_ && newest->stamp < newest_->stamp;
+    if (now < tell_from_) {
+      // Readers have it before it is told. It is shown again while an owner is gone.
+      if (newest && !goes_back) remember(std::move(newest));
+      return {false, tell_from_};
+    }
     if (options_.rate > 0) tell_from_ = now + watch_period(options_.rate);
     const bool begins = !std::exchange(written_, written);
-    auto newest = memory->lookup_kept(a_, b_, {});
     // What a mirror has shown before is not new.
     const bool known =
         begins && newest && newest_ && newest->stamp == newest_->stamp && same(*newest, *newest_);
     // A clock was set back, or the end of the past was rewritten.
-    if (newest && newest_ && newest->stamp < newest_->stamp) forget_newest();
+    if (goes_back) forget_newest();
     remember(std::move(newest));
     if (known) return {};
     messages_.fetch_add(1, std::memory_order_relaxed);

@@ -195,6 +195,27 @@ TEST_CASE("lifetimes: a callback may end its own client") {
   CHECK(eventually([&] { return alive.expired(); }));
 }
 
+TEST_CASE("lifetimes: the function of a watch may hold the last client") {
+  const bool of_partition = GENERATE(false, true);
+  Pair pair;
+  std::shared_ptr<Client> shared = std::move(pair.client);
+  const std::weak_ptr<Client> alive = shared;
+  REQUIRE(pair.node.add("hand", "arm", {}));
+  REQUIRE(eventually([&] { return shared->exists("hand"); }));
+  const auto hold = [&] { return [held = shared](const auto&) {}; };
+  if (of_partition) {
+    PartitionWatchOptions options;
+    options.on_news = hold();
+    REQUIRE(shared->watch_partition("arm", options));
+  } else {
+    WatchOptions options;
+    options.on_route = hold();
+    REQUIRE(shared->watch("arm", "hand", options));
+  }
+  shared.reset();
+  CHECK(eventually([&] { return alive.expired(); }));
+}
+
 TEST_CASE("lifetimes: callbacks start and end each other concurrently") {
   // For ThreadSanitizer and AddressSanitizer.
   for (int round = 0; round < 30; ++round) {
