@@ -1,7 +1,8 @@
 # With TFDUDE_UNITY the files of a folder are compiled together, sixteen at once, because most of the time goes into the
 # headers and templates that they share. A whole build takes much less time then, and a changed file more; so
-# scripts/build --programs does it for a first build, and continuous integration compiles each file alone. Names in
-# unnamed namespaces are unique in a folder, which tests/check_unity.py checks.
+# scripts/build --programs does it for a first build, and so does continuous integration. All other builds, that of
+# Debian 13 and the preset dev among them, compile each file alone. Names in unnamed namespaces are unique in a folder,
+# which tests/check_unity.py checks.
 option(TFDUDE_UNITY "Compile the files of a folder together" OFF)
 
 function(tfdude_compile_together target)
@@ -9,6 +10,7 @@ function(tfdude_compile_together target)
     return()
   endif()
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+  target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
   get_target_property(sources ${target} SOURCES)
   foreach(source IN LISTS sources)
     get_filename_component(folder ${source} DIRECTORY)

@@ -17,11 +17,13 @@ using Milliseconds = std::chrono::milliseconds;
 /// The clock of a simulation or a replay. It is none of this computer, so it has no now(), and its
 /// times are of a type of their own: those of the system's clock do not compile in their place.
 struct ExternalClock {
+  // NOLINTBEGIN(readability-identifier-naming): the names that <chrono> gives to what a clock has
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;
   using period = duration::period;
   using time_point = std::chrono::time_point<ExternalClock>;
   static constexpr bool is_steady = false;
+  // NOLINTEND(readability-identifier-naming)
 };
 /// Time since the start of a simulation: `ExternalTime(20ms)`.
 using ExternalTime = ExternalClock::time_point;

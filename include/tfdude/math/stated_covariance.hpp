@@ -36,7 +36,7 @@ class StatedCovariance {
 
   /// As Covariance::trusted().
   [[nodiscard]] static StatedCovariance trusted(const Covariance::Upper& upper, bool complete) {
-    return StatedCovariance(upper, complete);
+    return {upper, complete};
   }
 
   /// Whether no edge is unspecified.

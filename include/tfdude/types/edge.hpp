@@ -40,7 +40,7 @@ struct PartialTransform {
   PartialTransform(std::optional<Eigen::Vector3d> p,
                    std::optional<Eigen::Quaterniond> q = std::nullopt,
                    std::optional<StatedCovariance> cov = std::nullopt)
-      : translation(std::move(p)), rotation(std::move(q)), covariance(std::move(cov)) {}
+      : translation(std::move(p)), rotation(std::move(q)), covariance(cov) {}
   // NOLINTNEXTLINE(google-explicit-constructor): it is the whole, of the same meaning
   PartialTransform(const Transform& X)
       : translation(X.pose.translation()), rotation(X.pose.rotation()), covariance(X.covariance) {}
