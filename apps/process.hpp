@@ -8,6 +8,7 @@
 #include <ctime>
 #include <memory>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <unistd.h>
 #include <utility>
@@ -47,13 +48,17 @@ inline void log_to_standard_error() {
 /// From now on the process ends within this time, whatever hangs: a thread of a library, or the
 /// disk. Changes that were acknowledged have been stored.
 inline void end_in(std::chrono::seconds time) {
-  std::thread([time] {
-    std::this_thread::sleep_for(time);
-    constexpr std::string_view kLine =
-        "a thread did not stop in time: the process ends without it\n";
-    (void)!write(STDERR_FILENO, kLine.data(), kLine.size());
-    std::_Exit(kRejected);
-  }).detach();
+  try {
+    std::thread([time] {
+      std::this_thread::sleep_for(time);
+      constexpr std::string_view kLine =
+          "a thread did not stop in time: the process ends without it\n";
+      (void)!write(STDERR_FILENO, kLine.data(), kLine.size());
+      std::_Exit(kRejected);
+    }).detach();
+  } catch (const std::system_error&) {  // there are too many threads
+    (void)alarm(static_cast<unsigned>(time.count()));
+  }
 }
 
 /// Less than service managers wait, and more than a slow disk needs.

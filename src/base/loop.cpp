@@ -1,11 +1,41 @@
 #include "base/loop.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <system_error>
 #include <utility>
 
+#include "base/log.hpp"
 #include "base/thread_name.hpp"
 
 namespace tfdude {
+namespace {
+
+// The 1st, 2nd, 4th, 8th... time of all loops.
+void log_no_thread(const Error& error) {
+  static std::atomic<std::uint64_t> times{0};
+  const std::uint64_t count = ++times;
+  if ((count & (count - 1)) == 0) log().error("{}: what it should do waits", error.message);
+}
+
+}  // namespace
+
+Result<void> Loop::begin() {
+  const Lock lock(mutex_);
+  return begin_thread();
+}
+
+Result<void> Loop::begin_thread() {
+  if (stopping_ || thread_.joinable()) return {};
+  try {
+    thread_ = std::thread([this] { run(); });
+  } catch (const std::system_error& error) {
+    return fail(Errc::kTransport, std::string("no thread '") + name_ + "': " + error.what());
+  }
+  return {};
+}
 
 void Loop::stop() {
   std::thread ending;
@@ -23,9 +53,19 @@ void Loop::wake() {
   {
     const Lock lock(mutex_);
     if (stopping_) return;
-    if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+    if (const auto begun = begin_thread(); !begun) {
+      log_no_thread(begun.error());
+      keep_asked();
+    }
   }
   changed_.notify_one();
+}
+
+// A job that was asked for wakes the loop only with its first request.
+void Loop::keep_asked() {
+  for (Job* job : jobs_) {
+    if (job->asked_.exchange(false)) job->due_ = Clock::now();
+  }
 }
 
 void Loop::run() {

@@ -6,12 +6,15 @@
 #include <thread>
 #include <vector>
 
+#include "tfdude/base/result.hpp"
+
 #include "base/mutex.hpp"
 
 namespace tfdude {
 
 /// A named thread that runs jobs, one at a time and in turn: soon after they were asked for, and at
-/// the times that they name. The thread begins with the first request.
+/// the times that they name. The thread begins with the first request. While the system has no
+/// thread to give, requests wait, and each later one tries to begin it again.
 /// @par Thread safety  All functions are thread-safe.
 class Loop {
  public:
@@ -26,11 +29,16 @@ class Loop {
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
 
+  /// Begins the thread now, unless it was begun or stopped. @return kTransport: there is none
+  [[nodiscard]] Result<void> begin();
+
   /// After it has returned no job runs. Not for its own jobs.
   void stop();
 
  private:
   void wake();
+  Result<void> begin_thread() TFDUDE_REQUIRES(mutex_);
+  void keep_asked() TFDUDE_REQUIRES(mutex_);
   void run();
   [[nodiscard]] Job* next_due(Clock::time_point now, Clock::time_point& wake_at)
       TFDUDE_REQUIRES(mutex_);

@@ -17,6 +17,7 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <system_error>
 #include <thread>
 #include <unistd.h>
 #include <utility>
@@ -185,10 +186,14 @@ Result<void> LinuxMemory::start() {
   if (thread_.joinable()) return {};
   wake_ = Descriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (!wake_.valid()) return refused_by_system("eventfd");
-  thread_ = std::thread([this] {
-    (void)pthread_setname_np(pthread_self(), "tfdude-memory");
-    run();
-  });
+  try {
+    thread_ = std::thread([this] {
+      (void)pthread_setname_np(pthread_self(), "tfdude-memory");
+      run();
+    });
+  } catch (const std::system_error& error) {
+    return unsupported(std::string("no thread for it: ") + error.what());
+  }
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/eventfd.h>
+#include <system_error>
 #include <thread>
 #include <unistd.h>
 #include <utility>
@@ -113,8 +114,12 @@ std::unique_ptr<OneShotSocket> OneShotSocket::open(const std::string& network, A
     if (!listening) continue;
     Descriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
     if (!wake.valid()) return nullptr;
-    return std::make_unique<LinuxOneShotSocket>(*std::move(listening), std::move(wake),
-                                                std::move(answer));
+    try {
+      return std::make_unique<LinuxOneShotSocket>(*std::move(listening), std::move(wake),
+                                                  std::move(answer));
+    } catch (const std::system_error&) {  // there are too many threads
+      return nullptr;
+    }
   }
   return nullptr;
 }

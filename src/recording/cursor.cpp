@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <system_error>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -264,7 +263,8 @@ Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
   return {};
 }
 
-std::future<void> Cursor::ReadsAhead::begin() {
+Result<std::future<void>> Cursor::ReadsAhead::begin() {
+  if (auto begun = loop_.begin(); !begun) return tl::unexpected(std::move(begun.error()));
   task_ = std::packaged_task<void()>([this] { cursor_.load_ahead(); });
   auto ended = task_.get_future();
   job_.ask();
@@ -273,9 +273,9 @@ std::future<void> Cursor::ReadsAhead::begin() {
 
 void Cursor::begin_to_read_ahead() {
   if (reads_ahead_ == nullptr || foreign_ || chunk_ == reader_.chunks().size()) return;
-  try {
-    ahead_ = reads_ahead_->begin();
-  } catch (const std::system_error&) {  // there are too many threads
+  if (auto begun = reads_ahead_->begin()) {
+    ahead_ = *std::move(begun);
+  } else {
     reads_ahead_ = nullptr;
   }
 }

@@ -64,7 +64,8 @@ class Cursor {
    private:
     friend class Cursor;
 
-    [[nodiscard]] std::future<void> begin();
+    /// @return kTransport: there is no thread
+    [[nodiscard]] Result<std::future<void>> begin();
 
     Cursor& cursor_;
     std::packaged_task<void()> task_;

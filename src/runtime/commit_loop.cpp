@@ -10,6 +10,7 @@ CommitLoop::CommitLoop(std::unique_ptr<StateStore> store, Effects& effects, Peri
       rounds_(loop_, [this] { return run(); }) {}
 
 Result<void> CommitLoop::start() {
+  if (auto begun = loop_.begin(); !begun) return begun;
   auto stored = round();
   if (stored) rounds_.ask();
   return stored;

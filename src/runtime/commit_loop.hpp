@@ -24,7 +24,7 @@ class CommitLoop {
   CommitLoop& operator=(const CommitLoop&) = delete;
 
   /// Stores and announces the current state on the caller's thread; then starts the loop.
-  /// @return kState; the loop has then not started.
+  /// @return kState; kTransport: no thread. The loop has then not started.
   [[nodiscard]] Result<void> start();
 
   /// Ends the loop; then stores and announces pending changes, on the caller's thread. Later ones

@@ -1,9 +1,11 @@
 #include "runtime/memory_waits.hpp"
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "base/log.hpp"
 #include "base/thread_name.hpp"
 #include "memory/waiting.hpp"
 
@@ -39,7 +41,7 @@ void MemoryWaits::wait_for(Owners owners) {
                                [](const auto& a, const auto& b) {
                                  return a.first == b.first && a.second.forest == b.second.forest;
                                });
-  if (same) return;
+  if (same) return begin();
   before = std::exchange(owners_, std::make_shared<const Owners>(std::move(owners)));
   for (const auto& [owner, waited] : *before) {
     const auto now = owners_->find(owner);
@@ -48,7 +50,17 @@ void MemoryWaits::wait_for(Owners owners) {
   }
   for (const auto& [owner, waited] : *owners_) waited.memory.tell_waiting(true);
   note_change();
-  if (!thread_.joinable() && !owners_->empty()) thread_ = std::thread([this] { run(); });
+  begin();
+}
+
+void MemoryWaits::begin() {
+  if (thread_.joinable() || owners_->empty()) return;
+  try {
+    thread_ = std::thread([this] { run(); });
+  } catch (const std::system_error& error) {
+    log().error("no thread 'tfdude-wait': changes in the memory of owners are not told: {}",
+                error.what());
+  }
 }
 
 void MemoryWaits::run() {

@@ -46,6 +46,7 @@ class MemoryWaits {
 
  private:
   void run();
+  void begin() TFDUDE_REQUIRES(mutex_);
   void note_change() TFDUDE_REQUIRES(mutex_);
 
   const Loop::Job::Run on_commits_;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -22,6 +23,7 @@
 #include "support/domain_lease.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
+#include "support/no_threads.hpp"
 #include "support/process.hpp"
 #include "types/topic_names.hpp"
 
@@ -131,6 +133,51 @@ TEST_CASE("creation: who cannot create an entity does not open, and says which")
     CHECK_THAT(opened.error().message,
                ContainsSubstring("Fast DDS could not create " + creations.failed));
   }
+}
+
+TEST_CASE("creation: what Fast DDS throws is an error, as its reason") {
+  const testing::DomainLease lease;
+  const Failing failing([](const std::string&) -> bool { throw std::runtime_error("no luck"); });
+  const auto opened = ends([&] { return a_node(options_in(lease)); });
+  REQUIRE_FALSE(opened);
+  CHECK(opened.error().code == Errc::kTransport);
+  CHECK_THAT(opened.error().message, ContainsSubstring(": no luck"));
+}
+
+TEST_CASE("creation: who gets no thread does not open, and does once there are some") {
+  const testing::DomainLease lease;
+  const Options options = options_in(lease);
+  const OpenAndClose open = GENERATE(OpenAndClose(a_node), OpenAndClose(a_client_with_clock));
+  const auto opened = ends([&] {
+    const testing::NoThreads none;
+    return open(options);
+  });
+  REQUIRE_FALSE(opened);
+  CHECK(opened.error().code == Errc::kTransport);
+  CHECK(ends([&] { return open(options); }));
+}
+
+TEST_CASE("creation: a client that gets no thread returns errors, until it gets one") {
+  const testing::DomainLease lease;
+  Options options = without_memory(options_in(lease));
+  options.timeout = 500ms;
+  const Node node = Node::open("arm", frames(), options).value();
+  auto client = std::make_unique<Client>(Client::open(options).value());
+  REQUIRE(testing::eventually([&] { return client->exists("base"); }));
+  ends([&] {
+    const testing::NoThreads none;
+    (void)client->lookup("map", "tip");
+    (void)client->update("base", testing::along_x(2));
+    (void)client->publish({{"base", testing::along_x(2)}});
+    (void)client->publish_joints({"elbow"}, {0.5});
+    return client->watch("map", "base").map([](const PathWatch&) {});
+  });
+  CHECK(testing::eventually([&] { return client->lookup("map", "tip").has_value(); }));
+  CHECK(client->update("base", testing::along_x(2)));
+  ends([&] {
+    const testing::NoThreads none;
+    client.reset();
+  });
 }
 
 TEST_CASE(

@@ -1,7 +1,12 @@
 #include "transport/fastdds/creation.hpp"
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <cstring>
+#include <future>
+#include <limits.h>
+#include <pthread.h>
 #include <utility>
 
 #include "base/log.hpp"
@@ -47,6 +52,32 @@ Mutex& endpoints_change() {
 
 tl::unexpected<Error> not_created(const std::string& what) {
   return fail(Errc::kTransport, "Fast DDS could not create " + what);
+}
+
+Result<void> threads_to_spare() {
+  // One for each socket on which it receives, and some others.
+  std::array<pthread_t, 12> threads{};
+  std::promise<void> all;
+  const std::shared_future<void> ended = all.get_future().share();
+  const auto wait = [](void* until) -> void* {
+    static_cast<const std::shared_future<void>*>(until)->wait();
+    return nullptr;
+  };
+  pthread_attr_t small;
+  pthread_attr_init(&small);
+  pthread_attr_setstacksize(&small, static_cast<std::size_t>(PTHREAD_STACK_MIN) * 4);
+  std::size_t begun = 0;
+  int error = 0;
+  while (begun < threads.size() && error == 0) {
+    error = pthread_create(&threads[begun], &small, wait,
+                           const_cast<void*>(static_cast<const void*>(&ended)));
+    if (error == 0) ++begun;
+  }
+  pthread_attr_destroy(&small);
+  all.set_value();
+  for (std::size_t i = 0; i < begun; ++i) pthread_join(threads[i], nullptr);
+  if (error == 0) return {};
+  return fail(Errc::kTransport, "no threads for Fast DDS: " + std::string(std::strerror(error)));
 }
 
 void log_not_created(const char* consequence, const Error& error) {

@@ -61,6 +61,8 @@ Result<void> FastDdsTransport::start(TransportHandler& handler) {
   access_ = *std::move(access);
   admission_.configure(access_.authority());
   worker_.emplace();
+  if (auto begun = worker_->begin(); !begun) return begun;
+  if (auto spare = threads_to_spare(); !spare) return spare;
   attention_.start(*worker_);
   if (auto created = create_participant(); !created) return created;
   if (auto created = create_endpoints(); !created) return created;

@@ -20,6 +20,9 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
+  /// Before all else. @return kTransport: the system has no thread to give
+  [[nodiscard]] Result<void> begin() { return loop_.begin(); }
+
   void post(std::function<void()> job) {
     {
       const Lock lock(mutex_);
