@@ -11,7 +11,9 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <sys/resource.h>
 #include <thread>
+#include <unistd.h>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -44,6 +46,24 @@ class Failing {
   ~Failing() { fastdds::fail_creations(nullptr); }
   Failing(const Failing&) = delete;
   Failing& operator=(const Failing&) = delete;
+};
+
+/// While it exists, this process can open only so many files and sockets more.
+class FewDescriptors {
+ public:
+  explicit FewDescriptors(int number) {
+    const int next = dup(STDERR_FILENO);
+    close(next);
+    getrlimit(RLIMIT_NOFILE, &before_);
+    const rlimit few{static_cast<rlim_t>(next + number), before_.rlim_max};
+    setrlimit(RLIMIT_NOFILE, &few);
+  }
+  ~FewDescriptors() { setrlimit(RLIMIT_NOFILE, &before_); }
+  FewDescriptors(const FewDescriptors&) = delete;
+  FewDescriptors& operator=(const FewDescriptors&) = delete;
+
+ private:
+  rlimit before_{};
 };
 
 /// Counts what is created, and lets the one with this number fail.
@@ -155,6 +175,29 @@ TEST_CASE("creation: who gets no thread does not open, and does once there are s
   REQUIRE_FALSE(opened);
   CHECK(opened.error().code == Errc::kTransport);
   CHECK(ends([&] { return open(options); }));
+}
+
+TEST_CASE("creation: who gets too few descriptors to hear others does not open") {
+  const testing::DomainLease lease;
+  const Options options = without_memory(options_in(lease));
+  const Node node = Node::open("arm", frames(), options).value();
+  int opened = 0;
+  constexpr int kMost = 24;
+  for (int number = 1; number < kMost; ++number) {  // the profile is read, too
+    CAPTURE(number);
+    auto client = ends([&] {
+      const FewDescriptors few(number);
+      return Client::open(options);
+    });
+    if (client) {
+      ++opened;
+      CHECK(ends([&] { return client->lookup("map", "tip"); }));
+    } else {
+      CHECK(client.error().code == Errc::kTransport);
+    }
+  }
+  CHECK(opened > 0);
+  CHECK(opened < kMost - 1);
 }
 
 TEST_CASE("creation: a client that gets no thread returns errors, until it gets one") {

@@ -39,7 +39,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
                   std::shared_ptr<Gate> inward, std::shared_ptr<LifeSigns> signs,
                   std::shared_ptr<Acknowledgements> acks,
                   std::shared_ptr<DatagramGuard> datagram_guard,
-                  std::shared_ptr<FairShare> fair_share, std::shared_ptr<Farewells> of_others)
+                  std::shared_ptr<FairShare> fair_share, std::shared_ptr<Farewells> of_others,
+                  std::shared_ptr<DiscoveryGate::Channels> opened)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
         client(of_client),
@@ -50,7 +51,8 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
         acknowledgements(std::move(acks)),
         guard(std::move(datagram_guard)),
         shares(std::move(fair_share)),
-        farewells(std::move(of_others)) {}
+        farewells(std::move(of_others)),
+        channels(std::move(opened)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
 
@@ -73,6 +75,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<DatagramGuard> guard;
   std::shared_ptr<FairShare> shares;
   std::shared_ptr<Farewells> farewells;
+  std::shared_ptr<DiscoveryGate::Channels> channels;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
 
@@ -114,6 +117,23 @@ class GatedTransport final : public SendFilter {
   ertps::LocatorList_t NormalizeLocator(const ertps::Locator_t& locator) override {
     if (!ertps::IPLocator::isAny(locator)) return SendFilter::NormalizeLocator(locator);
     return named(locator, [this](const ertps::Locator_t& own) { return is_locator_allowed(own); });
+  }
+
+  bool OpenInputChannel(const ertps::Locator_t& at, etransport::TransportReceiverInterface* to,
+                        std::uint32_t most) override {
+    if (!SendFilter::OpenInputChannel(at, to, most)) return false;
+    DiscoveryGate::Channels& channels = *descriptor_.channels;
+    if (!ertps::IPLocator::isMulticast(at)) {
+      ++(descriptor_.data_ports.contain(at.port) ? channels.of_data : channels.of_discovery);
+    }
+    return true;
+  }
+  // Fast DDS returns true also if it could not read the addresses of this computer.
+  bool OpenOutputChannel(etransport::SendResourceList& resources,
+                         const ertps::Locator_t& to) override {
+    if (!SendFilter::OpenOutputChannel(resources, to)) return false;
+    if (!resources.empty()) ++descriptor_.channels->outward;
+    return true;
   }
 
   void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
@@ -255,8 +275,7 @@ bool DiscoveryGate::hears_announcements(const edds::DomainParticipantQos& qos) {
   return discovery.discoveryProtocol == DiscoveryProtocol::SIMPLE && only_udp(qos);
 }
 
-void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain,
-                            bool client) const {
+void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.mutation_tries = std::max(builtin.mutation_tries, kParticipantsOfHost - 1);
   DataPorts data_ports;
@@ -264,6 +283,7 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
     const auto& port = qos.wire_protocol().port;
     data_ports.first = port.portBase + port.domainIDGain * domain + port.offsetd3;
     data_ports.step = port.participantIDGain;
+    counts_channels_ = !qos.transport().user_transports.empty();
   }
   if (kSeesSent && only_udp(qos)) guard_->sees_all_sent();
   auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;
@@ -274,8 +294,19 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
     if (!is_udp(transport)) continue;
     transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
                                                   gate_, life_signs_, acknowledgements_, guard_,
-                                                  shares_, farewells_);
+                                                  shares_, farewells_, channels_);
   }
+}
+
+Result<void> DiscoveryGate::check() const {
+  const Channels& open = *channels_;
+  if (!counts_channels_ || (open.of_discovery > 0 && open.of_data > 0 && open.outward > 0)) {
+    return {};
+  }
+  return fail(
+      Errc::kTransport,
+      "a socket could not be opened: no interface of the profile is up, or the ports of the "
+      "domain or the descriptors of this process are used up");
 }
 
 }  // namespace tfdude::fastdds

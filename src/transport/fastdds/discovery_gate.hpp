@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "tfdude/base/result.hpp"
+
 #include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/datagram_guard.hpp"
@@ -30,8 +32,9 @@ namespace tfdude::fastdds {
 /// - A client announces itself every 2 ms at first, at longer and longer intervals
 ///   (AnnouncementPace); later, and a server always, as set in the profile.
 /// - Fast DDS searches free ports for 101 participants of a host. The next ones receive nothing,
-///   and nobody is told. So it searches through all ports of the domain here, for 120 participants,
-///   from its number in this process on, which Fast DDS 2.9 counts up.
+///   and nobody is told, as without descriptors for its sockets. So it searches through all ports
+///   of the domain here, for 120 participants, from its number in this process on, which Fast DDS
+///   2.9 counts up; and check() tells whether it has got some.
 /// - With keys, messages of discovery are handled one after the other. A participant is announced
 ///   at one socket, and its handshake comes to another one. Fast DDS (2.9 and 3.1) drops a message
 ///   of the handshake while another thread handles something of the same participant, and repeats
@@ -58,11 +61,16 @@ class DiscoveryGate {
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
-  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client) const;
+  void prepare(edds::DomainParticipantQos& qos, std::uint32_t domain, bool client);
 
   /// Whether participants with these settings hear each other's periodic announcements, and
   /// LifeSigns sees them: discovery is the simple one, and all transports are UDP.
   [[nodiscard]] static bool hears_announcements(const edds::DomainParticipantQos& qos);
+
+  /// Whether the participant, which has been created, can send, and receives what is sent to it
+  /// alone: messages of discovery, and data. Not known if the profile overrides the ports.
+  /// @return kTransport
+  [[nodiscard]] Result<void> check() const;
 
   /// Lets the participant send: it has been created.
   void open() { open_->store(true, std::memory_order_relaxed); }
@@ -71,6 +79,13 @@ class DiscoveryGate {
   /// told of each endpoint before.
   void close() { open_->store(false, std::memory_order_relaxed); }
 
+  /// What is open: ports for messages to the participant alone, and sockets to send through.
+  struct Channels {
+    std::atomic<int> of_discovery{0};
+    std::atomic<int> of_data{0};
+    std::atomic<int> outward{0};
+  };
+
  private:
   const std::shared_ptr<Gate> gate_;
   const std::shared_ptr<LifeSigns> life_signs_;
@@ -78,6 +93,8 @@ class DiscoveryGate {
   const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<FairShare> shares_;
   const std::shared_ptr<Farewells> farewells_;
+  const std::shared_ptr<Channels> channels_ = std::make_shared<Channels>();
+  bool counts_channels_ = false;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);
 };
 

@@ -96,6 +96,7 @@ Result<void> FastDdsTransport::create_participant() {
   });
   if (!joined) return tl::unexpected(joined.error());
   participant_ = *joined;
+  if (auto heard = discovery_gate_.check(); !heard) return heard;
   discovery_gate_.open();
   self_ = peer_of(participant_->guid().guidPrefix);
   return create_topics(*participant_, counters_, topics_);
