@@ -155,6 +155,39 @@ TEST_CASE("ros values: where a gripper is in the map is as uncertain as localisa
   CHECK_THAT(bridge.err(), !ContainsSubstring("two publishers"));
 }
 
+TEST_CASE("ros values: poses at instants without data are counted, and told once") {
+  const RosRig rig;
+  const testing::TemporaryDirectory files;
+  auto bridge = rig.start_bridge(
+      {"--config", files.write("b.yaml",
+                               "values_in:\n"
+                               "  - {topic: /amcl_pose, child: base_link, edge: odom}\n")});
+  RosPeer peer(rig.ros_domain());
+  peer.advertise("/tf", "tf", "reliable");
+  peer.advertise("/amcl_pose", "pose", "reliable");
+  Client client = rig.client();
+  REQUIRE(eventually([&] {
+    peer.publish("/tf", testing::tf_message(at(0), {{"odom", "base_link", Pose()}}));
+    return client.exists("base_link");
+  }));
+  for (int k = 1; k <= 3; ++k) {
+    const std::string stamp = std::to_string(nanoseconds(at(-100 * k)));
+    peer.publish("/amcl_pose", stamp + " map" + numbers_of(Pose()) + " 0.01");
+  }
+  peer.publish("/amcl_pose", "0 map" + numbers_of(Pose()) + " 0.01");
+  REQUIRE(eventually([&] {
+    (void)bridge.runs();
+    return bridge.err().find("/amcl_pose: its message has no stamp") != std::string::npos;
+  }));
+  bridge.signal(SIGTERM);
+  CHECK(bridge.wait(testing::in_time()) == 0);
+  const std::string log = bridge.err();
+  const std::string said = "the edge of 'base_link' has no data";
+  CHECK_THAT(log, ContainsSubstring(said));
+  CHECK(log.find(said) == log.rfind(said));
+  CHECK_THAT(log, ContainsSubstring("of their stamps: unstamped=1 "));
+}
+
 TEST_CASE("ros values: a pose may be the value of its child's own edge") {
   const RosRig rig;
   const testing::TemporaryDirectory files;

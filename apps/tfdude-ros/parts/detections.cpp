@@ -61,8 +61,8 @@ void ObjectTaker::take(const DetectionImport::Sightings& sightings, const std::s
     const auto done = observe(one);
     if (done) continue;
     ++failed_;
-    const std::string& why = done.error().message;
-    if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+    const Error& error = done.error();
+    if (errors_.is_new(error)) spdlog::warn("{}: {}", settings_.topic, error.message);
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "../../worker.hpp"
 #include "../logic/detections.hpp"
+#include "../logic/error_reports.hpp"
 #include "../ros_domain.hpp"
 #include "frames_in.hpp"
 
@@ -38,7 +39,7 @@ class ObjectTaker {
   std::uint64_t rejected_ = 0;  // by the gate
   std::uint64_t failed_ = 0;
   std::uint64_t dropped_ = 0;  // frames
-  std::string logged_;
+  ErrorReports errors_;
   cli::Worker worker_{100};  // last: it uses the other members
 };
 

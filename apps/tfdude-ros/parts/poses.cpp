@@ -50,7 +50,7 @@ void PoseSender::run() {
     if (path) {
       send(*path);
     } else {
-      log_once(path.error().message);
+      log(path.error());
     }
   } while (pause());
 }
@@ -61,7 +61,7 @@ void PoseSender::send(const PathWatch& path) {
     const auto X = path.latest();
     // An owner that is away has its frames, but they are not exported.
     const auto health = path.health();
-    if (!health || !X) return log_once(X ? health.error().message : X.error().message);
+    if (!health || !X) return log(X ? health.error() : X.error());
     publish(*X);
     while (!path.wait_for_more(messages, Clock::now() + kPatience)) {
       if (stopping_ || !path.health()) return;
@@ -74,21 +74,21 @@ void PoseSender::publish(const StampedTransform& X) {
   std::optional<Message> message;
   if (settings_.odometry) {
     const auto velocity = node_.velocity(settings_.frame, settings_.child);
-    if (!velocity) return log_once(velocity.error().message);
+    if (!velocity) return log(velocity.error());
     message = message_of(settings_, X, *velocity, now);
   } else {
     message = message_of(settings_, X, now);
   }
   if (!message) {
-    return log_once("the covariance of " + quote(settings_.child) + " in " +
-                    quote(settings_.frame) + " is unspecified");
+    return log({Errc::kInvalidInput, "the covariance of " + quote(settings_.child) + " in " +
+                                         quote(settings_.frame) + " is unspecified"});
   }
-  logged_.clear();
+  errors_.succeeded();
   publisher_->publish(*message);
 }
 
-void PoseSender::log_once(const std::string& why) {
-  if (std::exchange(logged_, why) != why) spdlog::warn("not sent to {}: {}", settings_.topic, why);
+void PoseSender::log(const Error& why) {
+  if (errors_.is_new(why)) spdlog::warn("not sent to {}: {}", settings_.topic, why.message);
 }
 
 Result<void> PoseObserver::start(RosDomain& domain, const IsNeighbour& is_own) {
@@ -143,12 +143,12 @@ bool PoseObserver::observe(const Result<Measurement>& measured) {
   });
   if (observed) {
     ++(observed->accepted ? accepted_ : rejected_);
-    logged_.clear();
+    errors_.succeeded();
     return true;
   }
   ++failed_;
-  const std::string& why = observed.error().message;
-  if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+  const Error& error = observed.error();
+  if (errors_.is_new(error)) spdlog::warn("{}: {}", settings_.topic, error.message);
   return false;
 }
 

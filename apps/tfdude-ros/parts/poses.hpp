@@ -11,6 +11,7 @@
 #include "tfdude/client/node.hpp"
 
 #include "../../worker.hpp"
+#include "../logic/error_reports.hpp"
 #include "../logic/poses.hpp"
 #include "../logic/stamps.hpp"
 #include "../ros_domain.hpp"
@@ -34,14 +35,14 @@ class PoseSender {
   /// Until the path is no longer followed.
   void send(const PathWatch& path);
   void publish(const StampedTransform& X);
-  void log_once(const std::string& why);
+  void log(const Error& why);
   /// @return false if it is to stop
   bool pause();
 
   Node& node_;
   const PoseOut settings_;
   std::unique_ptr<Publisher> publisher_;
-  std::string logged_;
+  ErrorReports errors_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;  // last: it uses the other members
 };
@@ -69,7 +70,7 @@ class PoseObserver {
   std::uint64_t rejected_ = 0;  // by the gate
   std::uint64_t failed_ = 0;
   std::uint64_t placeless_ = 0;
-  std::string logged_;
+  ErrorReports errors_;
   StampReports stamps_;
   std::optional<PoseWithCovariance> last_;
   std::optional<GeoPose> last_place_;

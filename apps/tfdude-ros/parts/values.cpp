@@ -37,8 +37,9 @@ Result<void> ValueTaker::start(RosDomain& domain, const IsNeighbour& is_own) {
 
 void ValueTaker::stop() {
   worker_.stop();
-  spdlog::info("{}: values taken={} failed={} without a place={}; dropped messages={}",
-               settings_.topic, taken_, failed_, placeless_, worker_.dropped());
+  spdlog::info(
+      "{}: values taken={} failed={} without a place={}; of their stamps: {}; dropped messages={}",
+      settings_.topic, taken_, failed_, placeless_, stamps_.summary(), worker_.dropped());
 }
 
 void ValueTaker::take(const PoseWithCovariance& message, const std::string& child,
@@ -59,12 +60,12 @@ void ValueTaker::take(const GeoPose& message, const std::string& writer) {
 void ValueTaker::count(const Result<void>& done) {
   if (done) {
     ++taken_;
-    logged_.clear();
+    errors_.succeeded();
     return;
   }
   ++failed_;
-  const std::string& why = done.error().message;
-  if (std::exchange(logged_, why) != why) spdlog::warn("{}: {}", settings_.topic, why);
+  const Error& error = done.error();
+  if (errors_.is_new(error)) spdlog::warn("{}: {}", settings_.topic, error.message);
 }
 
 Result<void> ValueTaker::replace(const Result<TransformStamped>& value, const std::string& writer) {
@@ -79,6 +80,10 @@ Result<void> ValueTaker::determine(Result<Measurement> value, const std::string&
   if (!edge) return tl::unexpected(edge.error());
   if (!value->X_AB.covariance.complete()) {
     return fail(Errc::kInvalidInput, "covariance: the message has none");
+  }
+  if (!value->stamp) {
+    const auto report = stamps_.unstamped(settings_.topic, "taken at the latest common time");
+    if (report) spdlog::warn("{}", *report);
   }
   Query query;
   query.at = value->stamp;

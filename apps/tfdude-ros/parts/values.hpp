@@ -6,6 +6,8 @@
 #include "tfdude/client/node.hpp"
 
 #include "../../worker.hpp"
+#include "../logic/error_reports.hpp"
+#include "../logic/stamps.hpp"
 #include "../logic/values.hpp"
 #include "../ros_domain.hpp"
 #include "frames_in.hpp"
@@ -41,7 +43,8 @@ class ValueTaker {
   std::uint64_t taken_ = 0;
   std::uint64_t failed_ = 0;
   std::uint64_t placeless_ = 0;
-  std::string logged_;
+  ErrorReports errors_;
+  StampReports stamps_;
   cli::Worker worker_{100};  // last: it uses the other members
 };
 
