@@ -68,6 +68,31 @@ TEST_CASE("ros robot: joints of ROS move the robot of a daemon, with the stated 
   CHECK(joint_of(client, "robot", name).variance == Approx(1e-4));
 }
 
+TEST_CASE("ros robot: a joint that nobody has is told once, whatever others publish") {
+  const RosRig rig;
+  auto daemon = rig.dude().start_daemon({"--partition", "robot", "--urdf", kRobot});
+  testing::await_ready(daemon);
+  auto bridge = rig.start_bridge({"--joints", "0.01"});
+  RosPeer peer(rig.ros_domain());
+  peer.advertise("/joint_states", "joints", "reliable");
+  Client client = rig.client();
+  const std::string name = client.joints("robot").value().front().name;
+  for (const double position : {0.125, 0.25, 0.375}) {
+    REQUIRE(eventually([&] {
+      peer.publish("/joint_states", now_ns() + " nobody 3");
+      peer.publish("/joint_states", now_ns() + " another 3");
+      peer.publish("/joint_states", now_ns() + ' ' + name + ' ' + std::to_string(position));
+      return joint_of(client, "robot", name).position == position;
+    }));
+  }
+  bridge.signal(SIGTERM);
+  CHECK(bridge.wait(testing::in_time()) == 0);
+  for (const char* const joint : {"'nobody'", "'another'"}) {
+    CHECK_THAT(bridge.err(), ContainsSubstring(joint));
+    CHECK(bridge.err().find(joint) == bridge.err().rfind(joint));
+  }
+}
+
 TEST_CASE("ros robot: measured joints are sent, and what ROS publishes does not come back") {
   const RosRig rig;
   auto daemon = rig.dude().start_daemon({"--partition", "robot", "--urdf", kRobot});

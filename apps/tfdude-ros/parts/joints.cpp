@@ -29,9 +29,10 @@ void JointsIn::take(const JointState& message) {
   for (const std::string& report : positions.reports) spdlog::warn("{}", report);
   if (positions.joints.empty()) return;
   const auto sent = node_.publish_joints(std::move(positions.joints), positions.stamp);
-  const std::string error = sent ? std::string() : sent.error().message;
-  if (error == std::exchange(logged_, error) || sent) return;
-  spdlog::warn("joints of ROS: {}", error);
+  // What comes between may be of another publisher, with joints that are known.
+  if (!sent && errors_.is_new(sent.error())) {
+    spdlog::warn("joints of ROS: {}", sent.error().message);
+  }
 }
 
 Result<void> JointsOut::start(RosDomain& domain, const IsNeighbour& is_own) {

@@ -8,6 +8,7 @@
 #include "tfdude/client/node.hpp"
 
 #include "../../worker.hpp"
+#include "../logic/error_reports.hpp"
 #include "../logic/joints.hpp"
 #include "../ros_domain.hpp"
 
@@ -29,7 +30,7 @@ class JointsIn {
 
   Node& node_;
   JointImport import_;
-  std::string logged_;  // the last error
+  ErrorReports errors_;
   cli::Worker worker_;  // last: it uses the other members
 };
 
