@@ -110,9 +110,9 @@ void WatchRounds::begin(Clock::time_point now) {
   turns_.clear();
   turn_ = 0;
   for (const auto& entry : all_) {
-    const bool renew = renews && period_ % entry->watched->periods() == 0;
+    if (renews && period_ % entry->watched->periods() == 0) entry->due = true;
     const bool lacking = entry->lacking.exchange(false);
-    if (lacking || replan || renew) turns_.push_back({entry, renew});
+    if (lacking || replan || entry->due) turns_.push_back(entry);
   }
 }
 
@@ -132,15 +132,18 @@ PendingRequests* WatchRounds::step(Clock::time_point now, WatchLink& link) {
 }
 
 void WatchRounds::finish_turn(bool settled) {
-  if (!settled) turns_[turn_].entry->lacking = true;
+  if (!settled) turns_[turn_]->lacking = true;
   ++turn_;
 }
 
 void WatchRounds::attend(Clock::time_point now, WatchLink& link) {
   Watched& watched = current();
   if (auto planned = link.plan(watched); !planned) {
+    // An owner that is silent ends what is not renewed there meanwhile.
+    turns_[turn_]->due = true;
     return finish_turn(watched.on_no_plan(std::move(planned.error()), now));
   }
+  const bool due = std::exchange(turns_[turn_]->due, false);
   Watched::Plan plan = watched.adopt(now);
   groups_ = std::move(plan.groups);
   hears_all_ = true;
@@ -155,7 +158,7 @@ void WatchRounds::attend(Clock::time_point now, WatchLink& link) {
       if (watched.on_deaf(std::move(opened.error()))) return finish_turn(true);
     }
   }
-  if (plan.is_new || turns_[turn_].renew || !hears_all_ || watched.lacks(now)) {
+  if (plan.is_new || due || !hears_all_ || watched.lacks(now)) {
     return ask(watched.lacks_from(), now);
   }
   watched.on_complete();

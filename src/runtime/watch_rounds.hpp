@@ -78,17 +78,15 @@ class WatchRounds {
     explicit Entry(std::shared_ptr<Watched> one) : watched(std::move(one)) {}
     const std::shared_ptr<Watched> watched;
     std::atomic<bool> lacking{true};  // must be attended to soon
+    // Is to be asked for, though its plan may be known. Of the rounds.
+    bool due = false;
   };
   using Entries = std::vector<std::shared_ptr<Entry>>;
-  struct Turn {
-    std::shared_ptr<Entry> entry;
-    bool renew = false;
-  };
 
   [[nodiscard]] Entries entries() const;
   /// Forgets what nobody needs any more. @return the others
   [[nodiscard]] Entries drop_unused();
-  [[nodiscard]] Watched& current() { return *turns_[turn_].entry->watched; }
+  [[nodiscard]] Watched& current() { return *turns_[turn_]->watched; }
   void attend(Clock::time_point now, WatchLink& link);
   /// Requests all values from the owners, or samples from an instant on.
   void ask(std::optional<Time> from, Clock::time_point now);
@@ -111,7 +109,7 @@ class WatchRounds {
   Clock::time_point next_ = kNever;
   std::uint64_t period_ = 0;
   Entries all_;
-  std::vector<Turn> turns_;
+  Entries turns_;
   std::size_t turn_ = 0;              // the current one
   std::set<std::uint64_t> attended_;  // groups of the round
   // Of the current turn:
