@@ -11,21 +11,22 @@ constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
 // Minimum interval of requests, for all waiting lookups together.
 constexpr std::chrono::microseconds kAskEvery{250};
 
-bool is_structural(Errc code) { return may_appear(code) || code == Errc::kUnreachable; }
-
 }  // namespace
+
+bool may_return(Errc code) {
+  return may_appear(code) || code == Errc::kUnreachable || code == Errc::kTimeout ||
+         code == Errc::kNotOwner;
+}
 
 bool is_worth_waiting(const Error& error, const Query& query) {
   switch (error.code) {
     case Errc::kNotYet:
-    case Errc::kTimeout:
-    case Errc::kNotOwner:
       return true;
     case Errc::kTooOld:
       // For the latest common time: one edge is ahead of the data of another.
       return !query.at;
     default:
-      return is_structural(error.code);
+      return may_return(error.code);
   }
 }
 

@@ -12,6 +12,9 @@
 
 namespace tfdude {
 
+/// Whether an owner or a frame that is missing may still come.
+[[nodiscard]] bool may_return(Errc code);
+
 /// Whether data that a lookup lacks may still come.
 [[nodiscard]] bool is_worth_waiting(const Error& error, const Query& query);
 

@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/transport/fastdds.hpp"
 
+#include "runtime/after_wait.hpp"
 #include "runtime/participant.hpp"
 
 namespace tfdude {
@@ -25,6 +26,16 @@ void await_frame(Participant& participant, const std::string& id, const Deadline
       info ? participant.queries().path(info->parent, id) : Result<std::vector<PathSegment>>();
   if (!path || path->empty()) return;
   participant.discovery().wait_for_partition(path->front().partition, deadline);
+}
+
+template <class Call>
+auto after_wait_for(Participant& participant, const std::string& partition, Milliseconds wait,
+                    Call call) {
+  const auto ready = [&](Milliseconds left) {
+    participant.discovery().wait_for_partition(partition, Deadline(left));
+    return Result<void>();
+  };
+  return after_wait(wait, ready, call);
 }
 
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
@@ -183,8 +194,8 @@ Result<void> Client::update_joints(std::vector<JointValue> joints, std::optional
 }
 
 Result<std::vector<JointInfo>> Client::joints(const std::string& partition, Milliseconds wait) {
-  participant_->discovery().wait_for_partition(partition, Deadline(wait));
-  return participant_->joints().list(partition);
+  return after_wait_for(*participant_, partition, wait,
+                        [&] { return participant_->joints().list(partition); });
 }
 
 Result<ClockDifference> Client::clock_difference(const std::string& partition) {
@@ -227,16 +238,17 @@ Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
                                         const Query& at_b, std::string_view fixed,
                                         Milliseconds wait) {
-  if (wait > Milliseconds(0)) {
-    const Deadline deadline(wait);
-    auto X_FA = participant_->lookups().wait(fixed, a, at_a, wait);
-    if (!X_FA) return X_FA;
-    auto X_FB = participant_->lookups().wait(fixed, b, at_b, deadline.left());
-    if (!X_FB) return X_FB;
-  }
-  return participant_->two_instants().lookup(std::string(a), at_a, std::string(b), at_b,
-                                             std::string(fixed),
-                                             participant_->discovery().call_deadline());
+  const auto ready = [&](Milliseconds left) {
+    const Deadline deadline(left);
+    auto found = participant_->lookups().wait(fixed, a, at_a, left);
+    if (found) found = participant_->lookups().wait(fixed, b, at_b, deadline.left());
+    return found;
+  };
+  return after_wait(wait, ready, [&] {
+    return participant_->two_instants().lookup(std::string(a), at_a, std::string(b), at_b,
+                                               std::string(fixed),
+                                               participant_->discovery().call_deadline());
+  });
 }
 
 std::vector<Result<StampedTransform>> Client::lookup_many(const std::vector<FramePair>& pairs,
@@ -319,34 +331,35 @@ Explanation Client::why(const std::string& a, const std::string& b, const WhyQue
 
 Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
                                 const WatchOptions& options, Milliseconds wait) {
-  if (wait > Milliseconds(0)) {
-    const auto there = participant_->lookups().wait(a, b, {}, wait);
-    if (!there) return tl::unexpected(there.error());
-  }
-  return participant_->watches().watch(a, b, options).map([](auto path) {
-    return PathWatch(path);
-  });
+  const auto ready = [&](Milliseconds left) {
+    return participant_->lookups().wait(a, b, {}, left);
+  };
+  return after_wait(wait, ready, [&] { return participant_->watches().watch(a, b, options); })
+      .map([](auto path) { return PathWatch(path); });
 }
 
 Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
                                        const WatchOptions& options, Milliseconds wait) {
-  const Deadline deadline(wait);
-  for (const std::string& id : ids) await_frame(*participant_, id, deadline);
-  return participant_->watches().watch_edges(ids, options).map([](auto edges) {
-    return EdgesWatch(edges);
-  });
+  const auto ready = [&](Milliseconds left) {
+    const Deadline deadline(left);
+    for (const std::string& id : ids) await_frame(*participant_, id, deadline);
+    return Result<void>();
+  };
+  return after_wait(wait, ready, [&] { return participant_->watches().watch_edges(ids, options); })
+      .map([](auto edges) { return EdgesWatch(edges); });
 }
 
 Result<Velocity> Client::velocity(const std::string& a, const std::string& b,
                                   const VelocityQuery& query, Milliseconds wait) {
-  if (wait > Milliseconds(0)) {
+  const auto ready = [&](Milliseconds left) {
     Query then;
     then.at = query.at;
-    const auto there = participant_->lookups().wait(a, b, then, wait);
-    if (!there) return tl::unexpected(there.error());
-  }
-  return participant_->velocities().velocity(a, b, query,
-                                             participant_->discovery().call_deadline());
+    return participant_->lookups().wait(a, b, then, left);
+  };
+  return after_wait(wait, ready, [&] {
+    return participant_->velocities().velocity(a, b, query,
+                                               participant_->discovery().call_deadline());
+  });
 }
 
 Result<Time> Client::now() {
@@ -403,14 +416,17 @@ Result<std::vector<EdgeConsistency>> Client::consistency(const std::string& part
 }
 
 Result<std::vector<HistoryInfo>> Client::history(const std::string& id, Milliseconds wait) {
-  await_frame(*participant_, id, Deadline(wait));
-  return participant_->queries().history(id);
+  const auto ready = [&](Milliseconds left) {
+    await_frame(*participant_, id, Deadline(left));
+    return Result<void>();
+  };
+  return after_wait(wait, ready, [&] { return participant_->queries().history(id); });
 }
 
 Result<std::vector<HistoryInfo>> Client::histories(const std::string& partition,
                                                    Milliseconds wait) {
-  participant_->discovery().wait_for_partition(partition, Deadline(wait));
-  return participant_->queries().histories(partition);
+  return after_wait_for(*participant_, partition, wait,
+                        [&] { return participant_->queries().histories(partition); });
 }
 
 Result<Pose> Client::lookup_pose(std::string_view a, std::string_view b) {

@@ -6,6 +6,7 @@
 #include "tfdude/math/point.hpp"
 
 #include "math/cloud_map.hpp"
+#include "runtime/after_wait.hpp"
 #include "runtime/many_lookups.hpp"
 #include "types/trajectory_builder.hpp"
 
@@ -75,8 +76,7 @@ Result<void> check(const CloudQuery& query, Eigen::Index points) {
 // two ways to the fixed frame have in common counts once.
 Result<ManyLookups::CloudPoses> ManyLookups::over_fixed(std::string_view a, std::string_view b,
                                                         const CloudQuery& query,
-                                                        const std::vector<Time>& instants,
-                                                        Milliseconds wait) {
+                                                        const std::vector<Time>& instants) {
   CloudPoses poses;
   Query at_a = query.lookup;
   if (!at_a.at) at_a.at = *std::max_element(instants.begin(), instants.end());
@@ -95,7 +95,7 @@ Result<ManyLookups::CloudPoses> ManyLookups::over_fixed(std::string_view a, std:
   }
   const auto X_AF = lookups_.lookup(a, std::string_view(query.fixed), at_a);
   if (!X_AF) return tl::unexpected(X_AF.error());
-  const auto X_FB = trajectory(query.fixed, b, instants, query.lookup, wait);
+  const auto X_FB = trajectory_once(query.fixed, b, instants, query.lookup);
   if (!X_FB) return tl::unexpected(X_FB.error());
   if (!X_FB->missing.empty()) return tl::unexpected(X_FB->missing.front().error);
   for (const auto& one : X_FB->X_AB) {
@@ -122,16 +122,16 @@ Result<ManyLookups::CloudPoses> ManyLookups::poses_of(std::string_view a, std::s
   }
   Groups groups = groups_of(query.stamps, query.group);
   if (!query.fixed.empty()) {
-    if (wait > Milliseconds(0)) {
+    const auto ready = [&](Milliseconds left) {
+      const Deadline deadline(left);
       const auto last = std::max_element(groups.instants.begin(), groups.instants.end());
       Query then = query.lookup;
       then.at = std::max(*last, query.lookup.at.value_or(*last));
-      for (const std::string_view end : {a, b}) {
-        const auto found = lookups_.wait(query.fixed, end, then, wait);
-        if (!found) return tl::unexpected(found.error());
-      }
-    }
-    auto found = over_fixed(a, b, query, groups.instants, wait);
+      auto found = lookups_.wait(query.fixed, a, then, left);
+      if (found) found = lookups_.wait(query.fixed, b, then, deadline.left());
+      return found;
+    };
+    auto found = after_wait(wait, ready, [&] { return over_fixed(a, b, query, groups.instants); });
     if (found) found->of_point = std::move(groups.of_point);
     return found;
   }

@@ -7,6 +7,7 @@
 
 #include "calls/instants_task.hpp"
 #include "calls/lookup_many_task.hpp"
+#include "runtime/after_wait.hpp"
 #include "types/trajectory_builder.hpp"
 
 namespace tfdude {
@@ -45,12 +46,22 @@ std::vector<ManyLookups::Found> ManyLookups::lookup(const std::vector<FramePair>
 Result<Trajectory> ManyLookups::trajectory(std::string_view a, std::string_view b,
                                            const std::vector<Time>& instants, const Query& query,
                                            Milliseconds wait) {
+  const auto ready = [&](Milliseconds left) -> Result<void> {
+    if (instants.empty()) return {};
+    Query last = query;
+    last.at = *std::max_element(instants.begin(), instants.end());
+    // Without its answer, the others may have theirs.
+    (void)lookups_.wait(a, b, last, left);
+    return {};
+  };
+  return after_wait(wait, ready, [&] { return trajectory_once(a, b, instants, query); });
+}
+
+Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_view b,
+                                                const std::vector<Time>& instants,
+                                                const Query& query) {
   TrajectoryBuilder all(instants.size());
   Query at = query;
-  if (wait > Milliseconds(0) && !instants.empty()) {
-    at.at = *std::max_element(instants.begin(), instants.end());
-    (void)lookups_.wait(a, b, at, wait);
-  }
   const Forest& forest = structure_.forest;
   const auto from = forest.find(a);
   const auto to = forest.find(b);

@@ -55,7 +55,10 @@ class ManyLookups {
                                             const CloudQuery& query, Milliseconds wait);
   [[nodiscard]] Result<CloudPoses> over_fixed(std::string_view a, std::string_view b,
                                               const CloudQuery& query,
-                                              const std::vector<Time>& instants, Milliseconds wait);
+                                              const std::vector<Time>& instants);
+  [[nodiscard]] Result<Trajectory> trajectory_once(std::string_view a, std::string_view b,
+                                                   const std::vector<Time>& instants,
+                                                   const Query& query);
 
   Structure& structure_;
   Discovery& discovery_;
