@@ -74,23 +74,26 @@ Cloud transform_cloud(const Session& session, const std::string& a, const std::s
                       py::handle points, const CloudQuery& query, Milliseconds wait) {
   const Numbers<Number> given = to_cloud<Number>(points);
   const auto from = columns(given);
-  if (wait > Milliseconds(0)) {
+  const auto ready = [&](Milliseconds left) -> Result<void> {
     Query last = query.lookup;
     if (!query.stamps.empty()) {
       last.at = std::max(*std::max_element(query.stamps.begin(), query.stamps.end()),
                          last.at.value_or(Time{}));
     }
     if (query.fixed.empty()) {
-      (void)wait_for_lookup(session, a, b, last, wait);
+      (void)wait_for_lookup(session, a, b, last, left);
     } else {
-      (void)wait_for_lookup(session, query.fixed, a, last, wait);
-      (void)wait_for_lookup(session, query.fixed, b, last, wait);
+      (void)wait_for_lookup(session, query.fixed, a, last, left);
+      (void)wait_for_lookup(session, query.fixed, b, last, left);
     }
-  }
-  return {value_of(session.call([&](Client& c) {
-            return c.transform_cloud(a, b, Eigen::Ref<const Eigen::Matrix<Number, 3, -1>>(from),
-                                     query);
-          })),
+    return {};
+  };
+  return {value_of(call_when_ready(session, wait, ready,
+                                   [&](Client& c) {
+                                     return c.transform_cloud(
+                                         a, b, Eigen::Ref<const Eigen::Matrix<Number, 3, -1>>(from),
+                                         query);
+                                   })),
           query.covariances};
 }
 

@@ -23,12 +23,6 @@ StampedTransform lookup(const Session& session, const std::string& a, const std:
   return value_of(session.call([&](Client& c) { return c.lookup(a, b, query); }));
 }
 
-/// Waits until a lookup can be answered, as calls that are more than one do first.
-void await_lookup(const Session& session, const std::string& a, const std::string& b,
-                  const Query& query, Milliseconds wait) {
-  if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(session, a, b, query, wait));
-}
-
 Possible can_lookup(const Session& session, const std::string& a, const std::string& b,
                     const Query& query, Milliseconds wait) {
   if (wait > Milliseconds(0)) {
@@ -100,10 +94,14 @@ void bind_own(ClientClass& cls) {
         query_a.at = to_stamp(at_a, "at_a");
         query_b.at = to_stamp(at_b, "at_b");
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
-        await_lookup(session, fixed, a, query_a, wait);
-        await_lookup(session, fixed, b, query_b, wait);
-        return value_of(
-            session.call([&](Client& c) { return c.lookup(a, query_a, b, query_b, fixed); }));
+        const auto ready = [&](Milliseconds left) {
+          auto found = wait_for_lookup(session, fixed, a, query_a, left);
+          if (found) found = wait_for_lookup(session, fixed, b, query_b, left);
+          return found;
+        };
+        return value_of(call_when_ready(session, wait, ready, [&](Client& c) {
+          return c.lookup(a, query_a, b, query_b, fixed);
+        }));
       },
       py::arg("a"), py::arg("at_a"), py::arg("b"), py::arg("at_b"), py::arg("fixed"), py::kw_only(),
       py::arg("timeout") = 0.0,
@@ -123,9 +121,11 @@ void bind_own(ClientClass& cls) {
             throw py::type_error("a Transform has its own covariance, and no direction");
           }
           const auto& X_BC = what.cast<const Transform&>();
-          await_lookup(session, a, b, query, wait);
-          return py::cast(
-              value_of(session.call([&](Client& c) { return c.transform(a, b, X_BC, query); })));
+          const auto ready = [&](Milliseconds left) {
+            return wait_for_lookup(session, a, b, query, left);
+          };
+          return py::cast(value_of(call_when_ready(
+              session, wait, ready, [&](Client& c) { return c.transform(a, b, X_BC, query); })));
         }
         Points points = to_points(what, covariance, direction);
         return transformed(py::cast(lookup(session, a, b, query, wait)), std::move(points),
@@ -146,8 +146,11 @@ void bind_own(ClientClass& cls) {
         query.over = to_duration(over, "over");
         Query middle;
         middle.at = query.at;
-        await_lookup(session, a, b, middle, to_milliseconds(timeout, "timeout"));
-        return value_of(session.call([&](Client& c) { return c.velocity(a, b, query); }));
+        const auto ready = [&](Milliseconds left) {
+          return wait_for_lookup(session, a, b, middle, left);
+        };
+        return value_of(call_when_ready(session, to_milliseconds(timeout, "timeout"), ready,
+                                        [&](Client& c) { return c.velocity(a, b, query); }));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(), py::arg("over") = 0.1,
       py::arg("timeout") = 0.0,

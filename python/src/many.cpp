@@ -260,6 +260,20 @@ void wait_for(const Session& session, const std::string& a, const std::string& b
   (void)wait_for_lookup(session, a, b, last, wait);
 }
 
+/// As Client::trajectory(), which waits for the last instant.
+Result<Trajectory> trajectory(const Session& session, const std::string& a, const std::string& b,
+                              const std::vector<Time>& instants, const Query& query,
+                              Milliseconds wait) {
+  const auto ready = [&](Milliseconds left) -> Result<void> {
+    if (instants.empty()) return {};
+    // Without its answer, the others may have theirs.
+    wait_for(session, a, b, query, *std::max_element(instants.begin(), instants.end()), left);
+    return {};
+  };
+  return call_when_ready(session, wait, ready,
+                         [&](Client& c) { return c.trajectory(a, b, instants, query); });
+}
+
 Batch at_one_instant(const Session& session, const std::vector<FramePair>& pairs,
                      const Query& query, Milliseconds wait) {
   auto found = session.call([&](Client& c) { return c.lookup_many(pairs, query); });
@@ -312,12 +326,8 @@ Batch lookup_many(const Session& session, std::vector<FramePair> pairs, py::hand
              std::all_of(stamps.begin(), stamps.end(), [](const auto& t) { return t; })) {
     std::vector<Time> instants;
     for (const auto& stamp : stamps) instants.push_back(*stamp);
-    wait_for(session, pairs[0].a, pairs[0].b, query,
-             *std::max_element(instants.begin(), instants.end()), wait);
-    batch = of_trajectory(value_of(session.call([&](Client& c) {
-                            return c.trajectory(pairs[0].a, pairs[0].b, instants, query);
-                          })),
-                          instants);
+    batch = of_trajectory(
+        value_of(trajectory(session, pairs[0].a, pairs[0].b, instants, query, wait)), instants);
   } else {
     for (std::size_t i = 0; i < stamps.size(); ++i) {
       query.at = stamps[i];
@@ -379,11 +389,7 @@ void bind_many(py::module_& module, ClientClass& cls) {
          py::handle timeout, py::handle extrapolate, int order) {
         std::vector<Time> times = to_instants(instants, "instants");
         const Query query = to_query(py::none(), extrapolate, py::none(), order);
-        if (!times.empty()) {
-          wait_for(session, a, b, query, *std::max_element(times.begin(), times.end()),
-                   to_milliseconds(timeout, "timeout"));
-        }
-        auto found = session.call([&](Client& c) { return c.trajectory(a, b, times, query); });
+        auto found = trajectory(session, a, b, times, query, to_milliseconds(timeout, "timeout"));
         return trajectory_object(value_of(std::move(found)), std::move(times));
       },
       py::arg("a"), py::arg("b"), py::arg("instants"), py::kw_only(), py::arg("timeout") = 0.0,

@@ -9,6 +9,11 @@ void check_interrupted() {
   check_usable();
 }
 
+bool may_return(Errc code) {
+  return is_unknown(code) || code == Errc::kNotConnected || code == Errc::kUnreachable ||
+         code == Errc::kTimeout || code == Errc::kNotOwner || code == Errc::kNotYet;
+}
+
 Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait) {
   const auto within = [](Milliseconds time) {
     return " within " + std::to_string(std::max(time, Milliseconds(0)).count()) + " ms";

@@ -27,6 +27,8 @@ template <class Duration>
 void check_interrupted();
 /// The error of the last slice of a wait, which names the time of the whole.
 [[nodiscard]] Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait);
+/// Whether an owner, a frame or data that is missing may still come.
+[[nodiscard]] bool may_return(Errc code);
 /// How often a wait looks.
 inline constexpr Milliseconds kLook{50};
 
@@ -48,6 +50,26 @@ auto value_after_wait(const Session& session, Milliseconds wait, Call call, MayH
       return result;
     }
     check_interrupted();
+  }
+}
+
+/// A call of several requests, before which it is waited until lookups can be answered. If an owner
+/// leaves in between, it is waited for again, as Client's own calls do.
+/// @param ready  takes how long to wait. @return why nothing can be called
+/// @param call  takes a client; does not wait
+template <class Ready, class Call>
+auto call_when_ready(const Session& session, Milliseconds wait, Ready ready, Call call)
+    -> decltype(session.call(call)) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::min(wait, Milliseconds(1 << 30));
+  for (Milliseconds left = wait;; check_interrupted()) {
+    if (left > Milliseconds(0)) {
+      auto there = ready(left);
+      if (!there) return tl::unexpected(std::move(there.error()));
+    }
+    auto result = session.call(call);
+    left = std::chrono::ceil<Milliseconds>(end - Clock::now());
+    if (result || left <= Milliseconds(0) || !may_return(result.error().code)) return result;
   }
 }
 

@@ -163,8 +163,11 @@ void bind_path(py::module_& module, ClientClass& client) {
          double rate, bool composed, py::handle span, py::handle timeout) {
         const WatchOptions options = options_of(rate, composed, span);
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
-        if (wait > Milliseconds(0)) (void)value_of(wait_for_lookup(*session, a, b, {}, wait));
-        return made(session, session->call([&](Client& c) { return c.watch(a, b, options); }));
+        const auto ready = [&](Milliseconds left) {
+          return wait_for_lookup(*session, a, b, {}, left);
+        };
+        return made(session, call_when_ready(*session, wait, ready,
+                                             [&](Client& c) { return c.watch(a, b, options); }));
       },
       py::arg("a"), py::arg("b"), py::kw_only(), py::arg("rate") = 0.0, py::arg("composed") = false,
       py::arg("span") = py::none(), py::arg("timeout") = 0.0,

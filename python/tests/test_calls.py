@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -274,3 +275,33 @@ def test_ensure(network, car):
         assert client.parent("cup") == "base" and client.lookup("base", "cup", START).translation[0] == 3
         with pytest.raises(tfdude.LookupException):
             client.ensure("cup", "moon", Transform())
+
+
+def test_calls_of_several_requests_wait_for_an_owner_that_leaves_and_returns(network):
+    frames = [FrameSpec("world"), FrameSpec("arm", "world", Transform.exact((1, 0, 0)))]
+    frames.append(FrameSpec("hand", "arm", Transform.exact((1, 0, 0))))
+    instants = START + np.arange(11) * MS
+    stop = threading.Event()
+
+    def come_and_go():
+        while not stop.is_set():
+            with tfdude.Node("arm", frames, network=network) as node:
+                for instant in instants:
+                    node.update("hand", Transform.exact((1, 0, 0)), int(instant))
+                time.sleep(0.002)
+
+    with tfdude.Client(network=network, shared_memory=False) as client:
+        thread = threading.Thread(target=come_and_go)
+        thread.start()
+        try:
+            for _ in range(100):
+                client.velocity("world", "hand", START + 5 * MS, over=0.002, timeout=20)
+                client.lookup_full("hand", START, "arm", START, "world", timeout=20)
+                client.trajectory("world", "hand", instants, timeout=20)
+                client.transform("world", "hand", Transform.exact(), timeout=20)
+                client.transform_cloud("world", "hand", np.zeros((11, 3)), stamps=instants, timeout=20)
+                client.lookup_many([("world", "hand")], instants, timeout=20, strict=False)
+                client.watch("world", "hand", timeout=20)
+        finally:
+            stop.set()
+            thread.join()

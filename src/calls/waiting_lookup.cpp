@@ -15,19 +15,13 @@ constexpr std::chrono::microseconds kAskEvery{250};
 
 bool may_return(Errc code) {
   return may_appear(code) || code == Errc::kUnreachable || code == Errc::kTimeout ||
-         code == Errc::kNotOwner;
+         code == Errc::kNotOwner || code == Errc::kNotYet;
 }
 
 bool is_worth_waiting(const Error& error, const Query& query) {
-  switch (error.code) {
-    case Errc::kNotYet:
-      return true;
-    case Errc::kTooOld:
-      // For the latest common time: one edge is ahead of the data of another.
-      return !query.at;
-    default:
-      return may_return(error.code);
-  }
+  // For the latest common time: one edge is ahead of the data of another.
+  if (error.code == Errc::kTooOld) return !query.at;
+  return may_return(error.code);
 }
 
 WaitingLookup::Answer WaitingLookup::attend(const Shared& shared, const News& news,

@@ -12,7 +12,7 @@
 
 namespace tfdude {
 
-/// Whether an owner or a frame that is missing may still come.
+/// Whether an owner, a frame or data that is missing may still come.
 [[nodiscard]] bool may_return(Errc code);
 
 /// Whether data that a lookup lacks may still come.

@@ -8,7 +8,7 @@
 namespace tfdude {
 
 /// A call of several requests, before which it is waited until lookups can be answered. If an owner
-/// leaves in between, it is waited for again, as by one lookup that waits.
+/// leaves in between, it and its data are waited for again, as by one lookup that waits.
 /// @param wait  zero: only the call
 /// @param ready  takes how long to wait. @return why nothing can be called
 /// @param call  has a deadline of its own
