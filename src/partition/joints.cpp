@@ -44,6 +44,18 @@ Transform value_of(const FrameSpec& frame) {
   return joint ? value_at(*joint, joint->position, joint->variance) : frame.X_PC;
 }
 
+PageJoint names_of(const JointSpec& joint) {
+  return {joint.name, joint.mimic ? joint.mimic->joint : ""};
+}
+
+std::map<std::string, PageJoint> joints_of(const std::vector<FrameSpec>& frames) {
+  std::map<std::string, PageJoint> joints;
+  for (const FrameSpec& frame : frames) {
+    if (frame.joint) joints.emplace(frame.id, names_of(*frame.joint));
+  }
+  return joints;
+}
+
 std::optional<StoredJoint> left_of(const JointSpec& joint, const std::vector<StoredJoint>& left) {
   const auto named = [&](const std::string& name) {
     return std::find_if(left.begin(), left.end(),

@@ -19,6 +19,11 @@ namespace tfdude {
 /// A frame's initial value: with a joint, the value at the joint's position.
 [[nodiscard]] Transform value_of(const FrameSpec& frame);
 
+/// The names of a joint and of the one that it mimics.
+[[nodiscard]] PageJoint names_of(const JointSpec& joint);
+/// Those of all frames with a joint, by id.
+[[nodiscard]] std::map<std::string, PageJoint> joints_of(const std::vector<FrameSpec>& frames);
+
 /// The position that an earlier process left for a joint: that of the joint it follows, if stored.
 [[nodiscard]] std::optional<StoredJoint> left_of(const JointSpec& joint,
                                                  const std::vector<StoredJoint>& left);

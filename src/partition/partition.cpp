@@ -85,7 +85,7 @@ void Partition::attach_joints(const std::vector<FrameSpec>& frames,
     const bool there = info && info->owner == kHeldHere && info->parent == frame.parent;
     if (!frame.joint || !there) continue;
     joints_.put(frame.id, *frame.joint, left_of(*frame.joint, left));
-    const PageJoint said{frame.joint->name, frame.joint->mimic ? frame.joint->mimic->joint : ""};
+    const PageJoint said = names_of(*frame.joint);
     pages_.put_joint(frame.id, said);
     directory_.put_own_joint(said);
   }

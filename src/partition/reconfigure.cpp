@@ -28,10 +28,19 @@ bool same_edge(const FrameSpec& was, const FrameSpec& entry, bool omitted_was_ex
          X.pose.rotation().coeffs().isApprox(Y.pose.rotation().coeffs(), kSameRotation);
 }
 
+// Whether an entry that existed before has the joint that it had, by its name.
+bool same_joint(const StoredState& state, const FrameSpec& entry) {
+  const auto was = state.configured_joints.find(entry.id);
+  if (was == state.configured_joints.end()) return !entry.joint;
+  const std::string& name = was->second.name;
+  return name.empty() || (entry.joint && entry.joint->name == name);
+}
+
 // @param was  the entry of the previous configuration; null: none
-std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, bool omitted_was_exact,
+std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, const StoredState& state,
                            bool is_there) {
-  if (was == nullptr || !same_edge(*was, entry, omitted_was_exact))
+  if (was == nullptr || !same_edge(*was, entry, state.omitted_was_exact) ||
+      !same_joint(state, entry))
     return is_there ? Kind::kReplace : Kind::kAdd;
   if (is_there && !(was->correlation == entry.correlation)) return Kind::kCorrelate;
   return std::nullopt;
@@ -117,8 +126,7 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
     }
     const auto was = before.find(entry.id);
     const bool is_there = parents.count(entry.id) != 0;
-    const auto kind = effect(entry, was != before.end() ? was->second : nullptr,
-                             state.omitted_was_exact, is_there);
+    const auto kind = effect(entry, was != before.end() ? was->second : nullptr, state, is_there);
     if (was != before.end()) before.erase(was);
     if (!kind) continue;
     if (*kind != Kind::kCorrelate) parents[entry.id] = entry.parent;

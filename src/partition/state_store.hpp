@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,9 @@ struct StoredState {
   bool omitted_was_exact = false;
   std::vector<StoredJoint> joints{};
   std::vector<Absent> absent{};  ///< partitions that this one missed
+  /// The joints of the entries that have one, by the ids of their frames; without a name: an
+  /// earlier version did not store it.
+  std::map<std::string, PageJoint> configured_joints{};
 };
 
 /// A change of the stored state. With whatever is stored, the values of all edges are, as of the

@@ -81,6 +81,24 @@ Result<void> load_configured(const Database& database, std::int64_t format, Stor
   });
 }
 
+// Each joint must belong to an entry.
+Result<void> load_entry_joints(const Database& database, std::int64_t format, StoredState& state) {
+  if (format < kEntryJointsFormat) {
+    for (const FrameSpec& entry : state.configured) state.configured_joints[entry.id] = {};
+    return {};
+  }
+  const char* sql = "SELECT id, name, follows FROM configured_joints";
+  return each_row(database, sql, [&](const Statement& row) -> Result<void> {
+    auto joint = read_entry_joint(row);
+    if (!joint) return tl::unexpected(std::move(joint.error()));
+    if (find_frame(state.configured, row.text(0)) == nullptr) {
+      return fail(Errc::kState, "a joint of " + quote(row.text(0)) + ", which does not exist");
+    }
+    state.configured_joints[row.text(0)] = *std::move(joint);
+    return {};
+  });
+}
+
 Result<void> load_joints(const Database& database, std::int64_t format, StoredState& state) {
   if (format < kJointsFormat) return {};
   const char* sql = format < kCorrelationFormat
@@ -153,8 +171,8 @@ Result<void> load_correlations(const Database& database, std::int64_t format, St
 
 Result<StoredState> read_state(const Database& database, std::int64_t format) {
   StoredState state;
-  for (auto part : {load_about, load_frames, load_tombstones, load_configured, load_joints,
-                    load_correlations, load_absent, load_times}) {
+  for (auto part : {load_about, load_frames, load_tombstones, load_configured, load_entry_joints,
+                    load_joints, load_correlations, load_absent, load_times}) {
     if (auto loaded = part(database, format, state); !loaded) {
       return tl::unexpected(std::move(loaded.error()));
     }

@@ -6,6 +6,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "store/schema.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -17,10 +19,11 @@ struct Columns {
   const char* table;
   const char* key;
   const char* all;
+  std::int64_t since = kSumsFormat;  // the first format with the table and its checksums
 };
 
 constexpr const char* kAbout = "about";
-constexpr std::array<Columns, 10> kTables{
+constexpr std::array<Columns, 11> kTables{
     {{kAbout, "partition", "partition, epoch"},
      {"frames", "id", "id, parent, x_pc, since"},
      {"notes", "id", "id, since, kind, rival"},
@@ -30,7 +33,8 @@ constexpr std::array<Columns, 10> kTables{
      {"ties", "id", "id, said, observed"},
      {"configured_ties", "id", "id, said"},
      {"absent", "partition", "partition, since, kind, incarnation"},
-     {"samples", "id", "id, stamp"}}};
+     {"samples", "id", "id, stamp"},
+     {"configured_joints", "id", "id, name, follows", kEntryJointsFormat}}};
 
 // FNV-1a.
 class Hash {
@@ -179,15 +183,17 @@ std::string rows_without_sum(const Columns& table) {
 
 }  // namespace
 
-Result<std::vector<WrongRow>> find_wrong_rows(Database& database) {
+Result<std::vector<WrongRow>> find_wrong_rows(Database& database, std::int64_t format) {
   std::vector<WrongRow> wrong;
   Result<void> done;
   for (const Columns& table : kTables) {
+    if (format < table.since) continue;
     if (done) done = add_rows(database, table, changed_rows(table), wrong);
     if (done) done = add_rows(database, table, missing_rows(table), wrong);
   }
   // A row whose key has changed has no checksum, but another one is missing.
   for (const Columns& table : kTables) {
+    if (format < table.since) continue;
     if (done && !wrong.empty()) done = add_rows(database, table, rows_without_sum(table), wrong);
   }
   if (!done) return tl::unexpected(std::move(done.error()));
@@ -212,6 +218,7 @@ Result<void> erase_rows(Database& database, const std::vector<WrongRow>& rows) {
         "DELETE FROM ties WHERE id NOT IN (SELECT id FROM frames);"
         "DELETE FROM samples WHERE id NOT IN (SELECT id FROM frames);"
         "DELETE FROM configured_ties WHERE id NOT IN (SELECT id FROM configured);"
+        "DELETE FROM configured_joints WHERE id NOT IN (SELECT id FROM configured);"
         "DELETE FROM joint_types WHERE name NOT IN (SELECT name FROM joints);"
         "DELETE FROM sums WHERE substr(name, 1, 5) = 'ties/' AND substr(name, 6) NOT IN "
         "(SELECT id FROM ties);"
@@ -219,6 +226,8 @@ Result<void> erase_rows(Database& database, const std::vector<WrongRow>& rows) {
         "(SELECT id FROM samples);"
         "DELETE FROM sums WHERE substr(name, 1, 16) = 'configured_ties/' AND substr(name, 17) NOT "
         "IN (SELECT id FROM configured_ties);"
+        "DELETE FROM sums WHERE substr(name, 1, 18) = 'configured_joints/' AND substr(name, 19) "
+        "NOT IN (SELECT id FROM configured_joints);"
         "DELETE FROM sums WHERE substr(name, 1, 12) = 'joint_types/' AND substr(name, 13) NOT IN "
         "(SELECT name FROM joint_types);");
   });

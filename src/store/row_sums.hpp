@@ -43,7 +43,9 @@ struct WrongRow {
   std::string key;
 };
 
-[[nodiscard]] Result<std::vector<WrongRow>> find_wrong_rows(sqlite::Database& database);
+/// @param format  that of the file
+[[nodiscard]] Result<std::vector<WrongRow>> find_wrong_rows(sqlite::Database& database,
+                                                            std::int64_t format);
 
 /// Erases these rows, and what belongs to them.
 /// @return kState for the row that says whose file it is: nothing can replace that

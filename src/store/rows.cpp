@@ -54,6 +54,16 @@ Result<Correlation> read_said(const sqlite::Statement& row) {
   return said;
 }
 
+Result<PageJoint> read_entry_joint(const sqlite::Statement& row) {
+  auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_TEXT});
+  PageJoint joint{row.text(1), row.text(2)};
+  if (ok) ok = check_id(row.text(0), "id");
+  if (ok && !joint.name.empty()) ok = check_id(joint.name, "joint");
+  if (ok && !joint.follows.empty()) ok = check_id(joint.follows, "joint");
+  if (!ok) return tl::unexpected(std::move(ok.error()));
+  return joint;
+}
+
 Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row) {
   if (auto ok = row.check_types({SQLITE_TEXT, SQLITE_BLOB, SQLITE_BLOB}); !ok) {
     return tl::unexpected(std::move(ok.error()));

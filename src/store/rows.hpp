@@ -17,6 +17,8 @@ namespace tfdude {
 [[nodiscard]] Result<StoredCorrelation> read_stored_correlation(const sqlite::Statement& row);
 /// Of an entry of the configuration.
 [[nodiscard]] Result<Correlation> read_said(const sqlite::Statement& row);
+/// The names of an entry's joint.
+[[nodiscard]] Result<PageJoint> read_entry_joint(const sqlite::Statement& row);
 /// Of a joint whose type is not known.
 inline constexpr std::uint64_t kNoType = 0;
 [[nodiscard]] Result<StoredJoint> read_joint(const sqlite::Statement& row);

@@ -31,6 +31,10 @@ constexpr std::array<const char*, kFormat> kSchemas{R"(
 )",
                                                     R"(
   CREATE TABLE sums(name TEXT PRIMARY KEY, sum INTEGER NOT NULL) WITHOUT ROWID;
+)",
+                                                    R"(
+  CREATE TABLE configured_joints(id TEXT PRIMARY KEY, name TEXT NOT NULL, follows TEXT NOT NULL)
+                     WITHOUT ROWID;
 )"};
 
 }  // namespace

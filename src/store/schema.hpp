@@ -9,15 +9,16 @@ namespace tfdude {
 inline constexpr std::int64_t kApplication = 0x74666475;  // "tfdu"
 
 // The first formats with joints; with joint types and correlations; with absent partitions; with
-// the stamps of values that are samples; with checksums. The tables of format 4 are those of format
-// 3, but a transform without covariance is unspecified.
+// the stamps of values that are samples; with checksums; with the joints of configured entries. The
+// tables of format 4 are those of format 3, but a transform without covariance is unspecified.
 inline constexpr std::int64_t kJointsFormat = 2;
 inline constexpr std::int64_t kCorrelationFormat = 3;
 inline constexpr std::int64_t kAbsentFormat = 3;
 inline constexpr std::int64_t kUnspecifiedFormat = 4;
 inline constexpr std::int64_t kSamplesFormat = 5;
 inline constexpr std::int64_t kSumsFormat = 6;
-inline constexpr std::int64_t kFormat = 6;
+inline constexpr std::int64_t kEntryJointsFormat = 7;
+inline constexpr std::int64_t kFormat = 7;
 
 // Of a joint, instead of a variance; since format 4.
 inline constexpr double kUnspecifiedVariance = -1;

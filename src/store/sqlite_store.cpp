@@ -86,6 +86,7 @@ class SqliteStore final : public StateStore {
   Statement erase_correlation_;
   Statement put_correlation_;
   Statement put_configured_correlation_;
+  Statement put_configured_joint_;
   Statement clear_absent_;
   Statement put_absent_;
   Statement erase_sample_;
@@ -187,6 +188,10 @@ Result<void> SqliteStore::bring_up_to_date() {
   const std::string mark = "PRAGMA user_version = " + std::to_string(kFormat);
   auto done = database_->atomically([&] {
     auto made = database_->run(schema.c_str());
+    if (made && format_ < kEntryJointsFormat) {
+      // Their joints are not known.
+      made = database_->run("INSERT INTO configured_joints SELECT id, '', '' FROM configured");
+    }
     if (made) made = database_->run(mark.c_str());
     if (made) made = prepare_newer();
     return made ? sums_.put_all() : made;
@@ -240,6 +245,7 @@ Result<void> SqliteStore::prepare_newer() {
       {&put_correlation_,
        "INSERT INTO ties SELECT ?1, ?2, ?3 WHERE EXISTS(SELECT 1 FROM frames WHERE id = ?1)"},
       {&put_configured_correlation_, "INSERT INTO configured_ties VALUES(?1, ?2)"},
+      {&put_configured_joint_, "INSERT INTO configured_joints VALUES(?1, ?2, ?3)"},
       {&clear_absent_, "DELETE FROM absent"},
       {&put_absent_, "INSERT INTO absent VALUES(?1, ?2, ?3, ?4)"},
       {&erase_sample_, "DELETE FROM samples WHERE id = ?1"},
@@ -265,7 +271,7 @@ Result<StoredState> SqliteStore::load() {
   auto state = read_state(*database_, format_);
   if (!state) return unreadable(state.error().message);
   if (format_ < kSumsFormat) return state;
-  const auto wrong = find_wrong_rows(*database_);
+  const auto wrong = find_wrong_rows(*database_, format_);
   if (!wrong) return unreadable(wrong.error().message);
   if (wrong->empty()) return state;
   std::string rows;
@@ -279,7 +285,7 @@ Result<StoredState> SqliteStore::load() {
 Result<std::vector<std::string>> SqliteStore::drop_wrong_rows() {
   std::vector<std::string> dropped;
   if (format_ < kSumsFormat) return dropped;
-  const auto wrong = find_wrong_rows(*database_);
+  const auto wrong = find_wrong_rows(*database_, format_);
   if (!wrong) return unreadable(wrong.error().message);
   if (wrong->empty()) return dropped;
   auto done = make_ready();
@@ -404,15 +410,21 @@ Result<void> SqliteStore::save_values(const std::vector<ChangedEdge>& edges) {
 }
 
 Result<void> SqliteStore::save_configured(const std::vector<FrameSpec>& frames) {
-  Result<void> done = database_->run("DELETE FROM configured; DELETE FROM configured_ties;");
-  if (done) done = sums_.clear("configured");
-  if (done) done = sums_.clear("configured_ties");
+  Result<void> done = database_->run(
+      "DELETE FROM configured; DELETE FROM configured_ties; DELETE FROM configured_joints;");
+  for (const char* table : {"configured", "configured_ties", "configured_joints"}) {
+    if (done) done = sums_.clear(table);
+  }
   for (const FrameSpec& frame : frames) {
     if (done) done = put_configured_.run(frame.id, frame.parent, value_of(frame));
     if (done) done = sums_.put("configured", frame.id);
     if (!done || frame.correlation.empty()) continue;
     done = put_configured_correlation_.run(frame.id, Blob{to_blob(frame.correlation)});
     if (done) done = sums_.put("configured_ties", frame.id);
+  }
+  for (const auto& [id, joint] : joints_of(frames)) {
+    if (done) done = put_configured_joint_.run(id, joint.name, joint.follows);
+    if (done) done = sums_.put("configured_joints", id);
   }
   return done;
 }

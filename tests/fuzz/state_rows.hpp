@@ -34,6 +34,7 @@ class RowWriter {
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), x'')",
         "INSERT OR REPLACE INTO ties VALUES(?1, zeroblob(9), ?3)",
         "INSERT OR REPLACE INTO configured_ties VALUES(?1, zeroblob(9))",
+        "INSERT OR REPLACE INTO configured_joints VALUES(?1, ?2, ?1)",
         "INSERT OR REPLACE INTO absent VALUES(?1, ?4, ?5, ?4)",
         "UPDATE about SET epoch = ?4",
         "UPDATE about SET partition = ?1",

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "partition/joints.hpp"
 #include "partition/partition.hpp"
 #include "partition/state_store.hpp"
 
@@ -17,6 +18,7 @@ class MemoryStore final : public StateStore {
     StoredState state{epoch_, {}, {}, configured_};
     for (const auto& [name, joint] : joints_) state.joints.push_back(joint);
     state.absent = absent_;
+    state.configured_joints = joints_of(configured_);
     for (const auto& [id, frame] : frames_) state.frames.push_back(frame);
     for (const auto& [id, tombstone] : tombstones_) state.tombstones.push_back(tombstone);
     return state;

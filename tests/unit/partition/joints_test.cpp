@@ -31,6 +31,15 @@ using testing::revolute_named;
 
 constexpr Time kNow{std::chrono::seconds(100)};
 
+using Lines = std::vector<std::string>;
+
+Lines described(const StoredState& state, const std::vector<FrameSpec>& configured) {
+  Lines lines;
+  for (const auto& change : configured_changes(state, configured))
+    lines.push_back(describe(change));
+  return lines;
+}
+
 Time at(int milliseconds) { return kNow + Milliseconds(milliseconds); }
 
 // base - upper - fore - hand, the latter two coupled, beside them a rail.
@@ -312,7 +321,8 @@ TEST_CASE("a partition restores the positions of its joints") {
     Arm arm;
     REQUIRE(arm.partition.restore(*store.load(), arm.frames(), kNow));
     REQUIRE(store.save(testing::unsaved(arm.partition, true)));
-    REQUIRE(arm.partition.apply(JointUpdate{{{"shoulder", 0.5, 1e-4}, {"elbow", 0.75, 0.04}}, {}}));
+    REQUIRE(
+        arm.partition.apply(JointUpdate{{{"shoulder", 0.5, 1e-4}, {"elbow", 0.75, 0.04}}, at(0)}));
     REQUIRE(store.save(testing::unsaved(arm.partition, true)));
     CHECK(arm.partition.take_unsaved(true).joints.empty());
   }
@@ -383,6 +393,40 @@ TEST_CASE("a partition restores the positions of its joints") {
     REQUIRE(next.partition.restore(*store.load(), frames, kNow));
     CHECK(next.info("elbow").position == 0.125);
     CHECK(next.info("elbow").measured);
+  }
+  SECTION("with a link that became fixed: it is as its entry says") {
+    auto frames = arm.frames();
+    frames[1].joint.reset();
+    CHECK(described(*store.load(), frames) ==
+          Lines{"frame 'upper': changed to its new entry, under 'base'"});
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
+    CHECK_FALSE(arm.forest.kept("upper")->time.stamp);
+    REQUIRE(store.save(testing::unsaved(arm.partition, true)));
+    CHECK(described(*store.load(), frames).empty());
+    // And back: the joint is a new one.
+    CHECK(described(*store.load(), arm.frames()) ==
+          Lines{"frame 'upper': changed to its new entry, under 'base'"});
+  }
+  SECTION("with a renamed joint: it is a new one") {
+    auto frames = arm.frames();
+    frames[1].joint->name = "lift";
+    CHECK(described(*store.load(), frames) ==
+          Lines{"frame 'upper': changed to its new entry, under 'base'"});
+    REQUIRE(arm.partition.restore(*store.load(), frames, kNow));
+    CHECK(pose_diff(arm.edge("base", "upper").pose, along_x(1).pose, 1e-15) == "");
+    CHECK_FALSE(arm.forest.kept("upper")->time.stamp);
+    CHECK(arm.info("lift").position == 0);
+    CHECK_FALSE(arm.info("lift").measured);
+  }
+  SECTION("with a state that does not say which joints there were: the position is kept") {
+    auto state = *store.load();
+    for (auto& [id, joint] : state.configured_joints) joint = {};
+    auto frames = arm.frames();
+    frames[1].joint.reset();
+    CHECK(described(state, frames).empty());
+    REQUIRE(arm.partition.restore(state, frames, kNow));
+    CHECK(testing::yaw(arm.forest.lookup("base", "upper")) == Approx(0.5));
   }
   SECTION("with a revolute joint that lost its limits: the position is kept") {
     auto frames = arm.frames();

@@ -73,11 +73,12 @@ TEST_CASE("a file with foreign tables or triggers or views is rejected and not c
 
 TEST_CASE("a file of format 1 is read and updated by the first write") {
   const TemporaryDirectory directory;
-  const std::string file = changed_by(directory,
-                                      "DROP TABLE sums; DROP TABLE samples; DROP TABLE absent; "
-                                      "DROP TABLE joints; DROP TABLE ties; DROP "
-                                      "TABLE configured_ties; DROP TABLE joint_types; "
-                                      "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
+  const std::string file = changed_by(
+      directory,
+      "DROP TABLE sums; DROP TABLE configured_joints; DROP TABLE samples; DROP TABLE absent; "
+      "DROP TABLE joints; DROP TABLE ties; DROP "
+      "TABLE configured_ties; DROP TABLE joint_types; "
+      "PRAGMA user_version = 1; PRAGMA journal_mode = DELETE");
   const std::string before = content(file);
   {
     const auto store = open_sqlite_store(file, "arms");
@@ -100,12 +101,12 @@ TEST_CASE("a file of format 1 is read and updated by the first write") {
 
 TEST_CASE("a file of format 2 is read and updated by the first write") {
   const TemporaryDirectory directory;
-  const std::string file =
-      changed_by(directory,
-                 "DROP TABLE sums; DROP TABLE samples; DROP TABLE absent; DROP TABLE ties; "
-                 "DROP TABLE configured_ties; DROP TABLE "
-                 "joint_types; PRAGMA user_version = 2; "
-                 "PRAGMA journal_mode = DELETE");
+  const std::string file = changed_by(directory,
+                                      "DROP TABLE sums; DROP TABLE configured_joints; DROP TABLE "
+                                      "samples; DROP TABLE absent; DROP TABLE ties; "
+                                      "DROP TABLE configured_ties; DROP TABLE "
+                                      "joint_types; PRAGMA user_version = 2; "
+                                      "PRAGMA journal_mode = DELETE");
   const StoredCorrelation unknown{{true, {}, {}}, {}};
   {
     const auto store = open_sqlite_store(file, "arms");

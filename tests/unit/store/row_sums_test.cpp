@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <sqlite3.h>
 #include <sstream>
 #include <string>
@@ -12,6 +13,7 @@
 #include "store/sqlite_store.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
 
@@ -77,6 +79,9 @@ std::string text_of(const StoredState& state) {
     correlation(one.correlation);
     text << '\n';
   }
+  for (const auto& [id, joint] : state.configured_joints) {
+    text << id << ' ' << joint.name << ' ' << joint.follows << '\n';
+  }
   for (const StoredJoint& one : state.joints) {
     text << one.name << ' ' << one.position << ' ' << one.variance.value_or(-1)
          << static_cast<int>(one.type.value_or(JointType())) << '\n';
@@ -97,7 +102,9 @@ struct Saved {
     change.tombstones = {{"lamp", 6, Tombstone::Kind::kRemoved, ""}};
     change.joints = {{"elbow", 0.5, 1e-4, JointType::kPrismatic}};
     change.absent = {{"legs", 5, Absent::Kind::kLost, 7}};
-    change.configured = {{"arm", "", along_x(1)}, {"hand", "arm", along_x(1)}};
+    change.configured = {{"arm", "", along_x(1)},
+                         {"hand", "arm", along_x(1)},
+                         testing::moved_by("tool", "hand", testing::revolute_named("wrist"))};
     REQUIRE(outcome(open_sqlite_store(file, "arms").value()->save(change)) == "ok");
   }
   TemporaryDirectory directory;
@@ -117,6 +124,7 @@ TEST_CASE("a changed value is named, and left out if that is wished") {
       {"UPDATE joints SET position = 0.25", "joints 'elbow'", 3},
       {"UPDATE joint_types SET type = 1", "joint_types 'elbow'", 3},
       {"UPDATE ties SET observed = x''", "", 3},  // as it was
+      {"UPDATE configured_joints SET name = 'elbow'", "configured_joints 'tool'", 3},
       {"UPDATE absent SET since = 6", "absent 'legs'", 3},
       {"UPDATE samples SET stamp = stamp + 1", "samples 'hand'", 3},
       {"UPDATE sums SET sum = sum + 1 WHERE name = 'frames/arm'", "frames 'arm'", 2},
@@ -184,11 +192,33 @@ TEST_CASE("whatever byte of a state file changes, nothing else is served") {
 
 TEST_CASE("a file of a format without checksums gets them with its first change") {
   const Saved saved;
-  run(saved.file, "DROP TABLE sums; PRAGMA user_version = 5");
+  run(saved.file, "DROP TABLE sums; DROP TABLE configured_joints; PRAGMA user_version = 5");
   CHECK(loaded(saved.file) == "ok");
   REQUIRE(outcome(open_sqlite_store(saved.file, "arms").value()->save({8, {}, {}, {}})) == "ok");
   run(saved.file, "UPDATE frames SET since = 9 WHERE id = 'hand'");
   CHECK_THAT(loaded(saved.file), ContainsSubstring("frames 'hand'"));
+}
+
+TEST_CASE("a file of a format without the joints of entries has none that are known") {
+  const Saved saved;
+  const auto known = [&] {
+    return open_sqlite_store(saved.file, "arms").value()->load().value().configured_joints;
+  };
+  using Known = std::map<std::string, PageJoint>;
+  CHECK(known() == Known{{"tool", {"wrist", ""}}});
+  run(saved.file,
+      "DELETE FROM sums WHERE name = 'configured_joints/tool'; "
+      "DROP TABLE configured_joints; PRAGMA user_version = 6");
+  const Known unknown{{"arm", {}}, {"hand", {}}, {"tool", {}}};
+  CHECK(known() == unknown);
+  SECTION("also once the file was updated without a configuration") {
+    REQUIRE(outcome(open_sqlite_store(saved.file, "arms").value()->save({8, {}, {}, {}})) == "ok");
+    CHECK(known() == unknown);
+  }
+  SECTION("and its rows have checksums as before") {
+    run(saved.file, "UPDATE frames SET since = 9 WHERE id = 'hand'");
+    CHECK_THAT(loaded(saved.file), ContainsSubstring("frames 'hand'"));
+  }
 }
 
 }  // namespace tfdude

@@ -270,8 +270,8 @@ TEST_CASE("a file that is not this partition's state is rejected and not changed
     CHECK_THAT(refused(file), ContainsSubstring("is damaged"));
   }
   SECTION("of a newer format") {
-    put(file, 60, std::string("\0\0\0\7", 4));
-    CHECK_THAT(refused(file), ContainsSubstring("has format 7; this version reads formats 1 to 6"));
+    put(file, 60, std::string("\0\0\0\10", 4));
+    CHECK_THAT(refused(file), ContainsSubstring("has format 8; this version reads formats 1 to 7"));
   }
   SECTION("of another program") {
     put(file, 68, std::string("\0\0\0\2", 4));
@@ -355,7 +355,7 @@ TEST_CASE("a file that cannot be updated to the current format stays unchanged u
   REQUIRE(sqlite3_open(file.c_str(), &raw) == SQLITE_OK);
   const char* const older =
       "DROP TABLE absent; DROP TABLE joint_types; DROP TABLE configured_ties; DROP TABLE ties; "
-      "DROP TABLE joints; DROP TABLE samples; DROP TABLE sums; "
+      "DROP TABLE joints; DROP TABLE samples; DROP TABLE sums; DROP TABLE configured_joints; "
       "PRAGMA user_version = 1";
   REQUIRE(sqlite3_exec(raw, older, nullptr, nullptr, nullptr) == SQLITE_OK);
   sqlite3_close(raw);
