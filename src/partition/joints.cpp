@@ -96,7 +96,14 @@ void Joints::put(const std::string& frame, const JointSpec& joint,
 }
 
 void Joints::detach_joint(const std::string& frame) {
-  for (Mover& mover : movers_) mover.detached = mover.detached || mover.frame == frame;
+  for (Mover& mover : movers_) {
+    if (mover.frame == frame) detach(mover);
+  }
+}
+
+// Its stored position would grow old, while those of joints that follow it are kept up to date.
+void Joints::detach(Mover& mover) {
+  if (!std::exchange(mover.detached, true)) erased_.insert(mover.spec.name);
 }
 
 bool Joints::is_coupled(std::string_view frame) const {
@@ -107,7 +114,9 @@ bool Joints::is_coupled(std::string_view frame) const {
 
 // For removed frames; another frame with that id is a different one.
 void Joints::forget_removed() {
-  for (Mover& mover : movers_) mover.detached = mover.detached || !forest_.info(mover.handle);
+  for (Mover& mover : movers_) {
+    if (!forest_.info(mover.handle)) detach(mover);
+  }
 }
 
 Result<void> Joints::plan(const JointValue& value) {
@@ -220,10 +229,29 @@ std::vector<JointInfo> Joints::infos(std::string_view after) const {
   return infos;
 }
 
+void Joints::erase_unused(const std::vector<StoredJoint>& stored) {
+  std::set<std::string_view> used;
+  for (const Mover& mover : movers_) {
+    if (mover.measured) used.insert(mover.spec.name);
+  }
+  for (const StoredJoint& joint : stored) {
+    if (used.count(joint.name) == 0) erased_.insert(joint.name);
+  }
+}
+
+// Two frames may have joints of one name.
+std::vector<std::string> Joints::take_erased() {
+  for (const Mover& mover : movers_) {
+    if (!mover.detached && mover.measured) erased_.erase(mover.spec.name);
+  }
+  const std::set<std::string> erased = std::exchange(erased_, {});
+  return {erased.begin(), erased.end()};
+}
+
 std::vector<StoredJoint> Joints::take_changed() {
   std::vector<StoredJoint> changed;
   for (Mover& mover : movers_) {
-    if (!mover.changed) continue;
+    if (!mover.changed || mover.detached) continue;
     changed.push_back({mover.spec.name, mover.position, mover.variance, mover.spec.type});
     mover.changed = false;
   }

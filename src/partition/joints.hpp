@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -67,6 +68,17 @@ class Joints {
   /// Sorted by name, starting after this one; at most kMaxItems.
   [[nodiscard]] std::vector<JointInfo> infos(std::string_view after = {}) const;
 
+  /// Of these stored positions, those of joints that had none to start with here, or that move
+  /// nothing, are erased: samples for others do not change them any more.
+  void erase_unused(const std::vector<StoredJoint>& stored);
+
+  /// The joints whose stored positions must be erased, since the last call: they move nothing.
+  [[nodiscard]] std::vector<std::string> take_erased();
+  /// They could not be erased: the next take_erased() returns them again.
+  void still_erased(const std::vector<std::string>& names) {
+    erased_.insert(names.begin(), names.end());
+  }
+
   /// The joints with new positions since the last call.
   [[nodiscard]] std::vector<StoredJoint> take_changed();
   /// They could not be saved: the next take_changed() returns them again.
@@ -103,12 +115,14 @@ class Joints {
   [[nodiscard]] bool starts_again(const Mover& mover, Time stamp) const;
   void take(const Step& step, std::optional<Time> stamp);
   void forget_removed();
+  void detach(Mover& mover);
 
   Forest& forest_;
   std::vector<Mover> movers_;
   std::vector<JointInfo> shown_;  // instead, sorted by name
   // The movers of a joint: its own and those that follow it. Empty for a follower.
   std::map<std::string, std::vector<std::size_t>, std::less<>> by_name_;
+  std::set<std::string> erased_;           // with stored positions that must be erased
   std::uint64_t plans_ = 0;                // number of updates so far
   std::vector<Step> steps_;                // of the current update; kept to reuse its memory
   std::vector<CorrelatedUpdate> updates_;  // as steps_

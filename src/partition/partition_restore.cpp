@@ -50,7 +50,7 @@ std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<S
 Result<void> Partition::restore(const StoredState& state, const std::vector<FrameSpec>& configured,
                                 Time now) {
   if (auto ok = check_joints(configured); !ok) return ok;
-  const std::vector<StoredJoint> joints = still_meant(state.joints, configured);
+  const std::vector<StoredJoint> joints = still_meant(state, configured);
   const std::vector<StoredFrame> frames = frames_of(state, joints, configured);
   directory_.restore(state.absent);
   for (const StoredFrame& frame : frames) directory_.saw_lamport_time(frame.lamport_time);
@@ -84,6 +84,8 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   }
   auto taken = reconfigure(state, joints, configured, now);
   if (taken) attach_joints(configured, joints);
+  // Without a configuration it is not known what they are.
+  if (!configured.empty()) joints_.erase_unused(state.joints);
   pages_.close_epoch();
   return taken;
 }
@@ -284,6 +286,7 @@ StateChange Partition::take_unsaved(bool values_due) {
     saved_absent_ = absent;
     change.absent = std::move(absent);
   }
+  change.erased_joints = joints_.take_erased();
   change.configured = std::exchange(configured_, std::nullopt);
   const bool values_asked = std::exchange(values_asked_, false);
   change.commits = {saved_commit_, saved_commit_};
@@ -297,6 +300,7 @@ StateChange Partition::take_unsaved(bool values_due) {
 void Partition::still_unsaved(const StateChange& change, const std::vector<Page>& pages) {
   unsaved_.insert(change.erased.begin(), change.erased.end());
   joints_.still_changed(change.joints);
+  joints_.still_erased(change.erased_joints);
   if (change.absent) saved_absent_.reset();
   if (change.configured) configured_ = change.configured;
   values_asked_ = values_asked_ || change.commits.last > change.commits.after;

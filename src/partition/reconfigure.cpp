@@ -50,23 +50,38 @@ bool is_same_unit(JointType a, JointType b) {
   return (a == JointType::kPrismatic) == (b == JointType::kPrismatic);
 }
 
-// By the names of stored joints: why their positions are of another unit now; empty if they are
-// not.
+// By the names of joints: whom they followed, if that is known.
+using Followed = std::map<std::string_view, std::string_view>;
+
+// Why the stored position of a joint means something else now; empty: it does not.
+std::string change_of(const StoredJoint& stored, const JointSpec& now, const Followed& followed) {
+  const std::string name = "joint " + quote(now.name);
+  if (stored.type && !is_same_unit(*stored.type, now.type)) {
+    return name + " is " + to_string(now.type) + ", and was " + to_string(*stored.type);
+  }
+  const auto before = followed.find(now.name);
+  if (!now.mimic || before == followed.end() || before->second == now.mimic->joint) return {};
+  return name + " mimics " + quote(now.mimic->joint) + ", and mimicked " +
+         (before->second.empty() ? "none" : quote(before->second));
+}
+
+// By the names of stored joints that are described: as change_of().
 using Meanings = std::map<std::string_view, std::string>;
 
-Meanings meanings_of(const std::vector<StoredJoint>& joints,
-                     const std::vector<FrameSpec>& configured) {
-  std::map<std::string_view, JointType> described;
+Meanings meanings_of(const StoredState& state, const std::vector<FrameSpec>& configured) {
+  std::map<std::string_view, const JointSpec*> described;
   for (const FrameSpec& frame : configured) {
-    if (frame.joint) described.emplace(frame.joint->name, frame.joint->type);
+    if (frame.joint) described.emplace(frame.joint->name, &*frame.joint);
+  }
+  Followed followed;
+  for (const auto& [id, joint] : state.configured_joints) {
+    if (!joint.name.empty()) followed.emplace(joint.name, joint.follows);
   }
   Meanings meanings;
-  for (const StoredJoint& joint : joints) {
-    std::string& why = meanings[joint.name];
+  for (const StoredJoint& joint : state.joints) {
     const auto now = described.find(joint.name);
-    if (now == described.end() || !joint.type || is_same_unit(*joint.type, now->second)) continue;
-    why = "joint " + quote(joint.name) + " is " + to_string(now->second) + ", and was " +
-          to_string(*joint.type);
+    if (now == described.end()) continue;
+    meanings.emplace(joint.name, change_of(joint, *now->second, followed));
   }
   return meanings;
 }
@@ -97,16 +112,18 @@ void add_removals(const std::map<std::string_view, const FrameSpec*>& gone,
 
 }  // namespace
 
-std::vector<StoredJoint> still_meant(const std::vector<StoredJoint>& joints,
+std::vector<StoredJoint> still_meant(const StoredState& state,
                                      const std::vector<FrameSpec>& configured) {
-  const Meanings meanings = meanings_of(joints, configured);
+  if (configured.empty()) return state.joints;
+  const Meanings meanings = meanings_of(state, configured);
   std::set<std::string_view> at_rest;
   for (const FrameSpec& frame : configured) {
     if (why_at_rest(meanings, frame) != nullptr) at_rest.insert(frame.joint->name);
   }
   std::vector<StoredJoint> meant;
-  for (const StoredJoint& joint : joints) {
-    if (at_rest.count(joint.name) == 0) meant.push_back(joint);
+  for (const StoredJoint& joint : state.joints) {
+    const bool described = meanings.count(joint.name) != 0;
+    if (described && at_rest.count(joint.name) == 0) meant.push_back(joint);
   }
   return meant;
 }
@@ -119,7 +136,7 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
   for (const FrameSpec& frame : state.configured) before.emplace(frame.id, &frame);
   std::map<std::string_view, std::string_view> parents;  // of the existing frames
   for (const StoredFrame& frame : state.frames) parents.emplace(frame.id, frame.parent);
-  const Meanings meanings = meanings_of(state.joints, configured);
+  const Meanings meanings = meanings_of(state, configured);
   for (const FrameSpec& entry : configured) {
     if (const auto* why = why_at_rest(meanings, entry)) {
       changes.push_back({Kind::kRest, entry.id, {}, *why});

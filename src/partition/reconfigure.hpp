@@ -18,9 +18,10 @@ namespace tfdude {
 [[nodiscard]] std::vector<ConfiguredChange> configured_changes(
     const StoredState& state, const std::vector<FrameSpec>& configured);
 
-/// The stored joint positions that are still valid: not those of a joint whose unit has changed
-/// between rotation and translation, nor those of joints that follow it.
-[[nodiscard]] std::vector<StoredJoint> still_meant(const std::vector<StoredJoint>& joints,
+/// The stored joint positions that are still valid: those of joints that the configuration
+/// describes, except a joint whose unit has changed between rotation and translation, joints that
+/// follow it, and one that follows another joint than before, of which nothing is stored.
+[[nodiscard]] std::vector<StoredJoint> still_meant(const StoredState& state,
                                                    const std::vector<FrameSpec>& configured);
 
 }  // namespace tfdude

@@ -59,9 +59,11 @@ struct StateChange {
   std::vector<ChangedEdge> values{};  ///< of existing frames; applied after the frames
   CommitRange commits{};              ///< which have written these values
   std::optional<std::vector<FrameSpec>> configured{};  ///< the configuration, at the start
+  std::vector<std::string> erased_joints{};            ///< applied before the new positions
 
   [[nodiscard]] bool empty() const {
-    return erased.empty() && joints.empty() && !absent && values.empty() && !configured;
+    return erased.empty() && joints.empty() && !absent && values.empty() && !configured &&
+           erased_joints.empty();
   }
 };
 

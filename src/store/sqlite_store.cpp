@@ -60,6 +60,7 @@ class SqliteStore final : public StateStore {
   Result<void> make_ready();
   Result<void> save_frames(const StateChange& change);
   Result<void> save_values(const std::vector<ChangedEdge>& edges);
+  Result<void> erase_joints(const std::vector<std::string>& names);
   Result<void> save_joints(const std::vector<StoredJoint>& joints);
   Result<void> save_configured(const std::vector<FrameSpec>& frames);
   Result<void> save_absent(const std::vector<Absent>& absent);
@@ -81,6 +82,8 @@ class SqliteStore final : public StateStore {
   Statement set_value_;
   Statement put_configured_;
   // For tables that older formats lack.
+  Statement erase_joint_;
+  Statement erase_joint_type_;
   Statement put_joint_;
   Statement put_joint_type_;
   Statement erase_correlation_;
@@ -239,6 +242,8 @@ Result<void> SqliteStore::prepare() {
 
 Result<void> SqliteStore::prepare_newer() {
   const std::pair<Statement*, const char*> all[] = {
+      {&erase_joint_, "DELETE FROM joints WHERE name = ?1"},
+      {&erase_joint_type_, "DELETE FROM joint_types WHERE name = ?1"},
       {&put_joint_, "INSERT OR REPLACE INTO joints VALUES(?1, ?2, ?3)"},
       {&put_joint_type_, "INSERT OR REPLACE INTO joint_types VALUES(?1, ?2)"},
       {&erase_correlation_, "DELETE FROM ties WHERE id = ?1"},
@@ -311,6 +316,7 @@ Result<void> SqliteStore::save(const StateChange& change) {
     Result<void> saved = save_frames(change);
     if (saved && change.absent) saved = save_absent(*change.absent);
     if (saved) saved = save_values(change.values);
+    if (saved) saved = erase_joints(change.erased_joints);
     if (saved) saved = save_joints(change.joints);
     return saved && change.configured ? save_configured(*change.configured) : saved;
   });
@@ -361,6 +367,17 @@ Result<void> SqliteStore::save_absent(const std::vector<Absent>& absent) {
     const auto since = static_cast<std::uint64_t>(one.since);
     if (done) done = put_absent_.run(one.partition, since, kind, incarnation);
     if (done) done = sums_.put("absent", one.partition);
+  }
+  return done;
+}
+
+Result<void> SqliteStore::erase_joints(const std::vector<std::string>& names) {
+  Result<void> done;
+  for (const std::string& name : names) {
+    if (done) done = erase_joint_.run(name);
+    if (done) done = erase_joint_type_.run(name);
+    if (done) done = sums_.erase("joints", name);
+    if (done) done = sums_.erase("joint_types", name);
   }
   return done;
 }

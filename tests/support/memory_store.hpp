@@ -32,6 +32,7 @@ class MemoryStore final : public StateStore {
     }
     for (const StoredFrame& frame : change.frames) frames_[frame.id] = frame;
     for (const Tombstone& tombstone : change.tombstones) tombstones_[tombstone.id] = tombstone;
+    for (const std::string& name : change.erased_joints) joints_.erase(name);
     for (const StoredJoint& joint : change.joints) joints_[joint.name] = joint;
     if (change.configured) configured_ = *change.configured;
     for (const ChangedEdge& edge : change.values) {

@@ -438,6 +438,105 @@ TEST_CASE("a partition restores the positions of its joints") {
   }
 }
 
+// What a process of "arm" with this configuration does, stored.
+template <class Act>
+void live(testing::MemoryStore& store, const std::vector<FrameSpec>& configured, Act act) {
+  Arm arm;
+  REQUIRE(arm.partition.restore(*store.load(), configured, kNow));
+  REQUIRE(store.save(testing::unsaved(arm.partition, true)));
+  act(arm);
+  REQUIRE(store.save(testing::unsaved(arm.partition, true)));
+}
+
+Lines stored_joints(testing::MemoryStore& store) {
+  Lines names;
+  const StoredState state = *store.load();
+  for (const StoredJoint& joint : state.joints) names.push_back(joint.name);
+  return names;
+}
+
+void move_elbow(Arm& arm, double position, int milliseconds) {
+  const JointUpdate update{{{"elbow", position, 0.04}}, at(milliseconds)};
+  REQUIRE(arm.partition.apply(update));
+}
+
+TEST_CASE("a mimic joint is where it was left, whatever became of the joint that it follows") {
+  testing::MemoryStore store;
+  const std::vector<FrameSpec> frames = Arm().frames();
+  live(store, frames, [](Arm& arm) { move_elbow(arm, 0.75, 0); });
+  CHECK(stored_joints(store) == Lines{"elbow", "wrist"});
+  // Another partition has that link from now on, or it only was given to another one.
+  std::vector<FrameSpec> later = frames;
+  SECTION("it was left out of the configuration") {
+    later.erase(later.begin() + 2);
+    live(store, later, [](Arm& arm) { move_elbow(arm, 1.25, 1); });
+  }
+  SECTION("it was released") {
+    live(store, later, [](Arm& arm) {
+      REQUIRE(arm.partition.release({"fore"}, kNow));
+      move_elbow(arm, 1.25, 1);
+    });
+  }
+  SECTION("it was moved") {
+    live(store, later, [](Arm& arm) {
+      const Reply reply =
+          arm.partition.answer(Request{1, "fore", MoveRequest{"base", along_x(1)}}, kNow);
+      REQUIRE(std::holds_alternative<Done>(reply.body));
+      move_elbow(arm, 1.25, 1);
+    });
+  }
+  CHECK(stored_joints(store) == Lines{"wrist"});
+  live(store, later, [](Arm& arm) {
+    CHECK(arm.info("wrist").position == -0.5 * 1.25 + 0.125);
+    CHECK(arm.info("wrist").measured);
+    CHECK(arm.forest.kept("hand")->time.stamp == at(1));
+  });
+}
+
+TEST_CASE("a joint whose frame returns as a new entry is at rest") {
+  testing::MemoryStore store;
+  const std::vector<FrameSpec> frames = Arm().frames();
+  live(store, frames, [](Arm& arm) { move_elbow(arm, 0.75, 0); });
+  live(store, {frames[0], frames[1]}, [](Arm&) {});
+  CHECK(stored_joints(store).empty());
+  live(store, frames, [](Arm& arm) {
+    CHECK(arm.info("elbow").position == 0);
+    CHECK_FALSE(arm.info("elbow").measured);
+  });
+}
+
+TEST_CASE("without a configuration the positions of joints stay stored") {
+  testing::MemoryStore store;
+  const std::vector<FrameSpec> frames = Arm().frames();
+  live(store, frames, [](Arm& arm) { move_elbow(arm, 0.75, 0); });
+  live(store, {}, [](Arm&) {});
+  live(store, frames, [](Arm& arm) { CHECK(arm.info("elbow").position == 0.75); });
+}
+
+TEST_CASE("a joint that mimics another one than before is at rest until a sample of that comes") {
+  testing::MemoryStore store;
+  const std::vector<FrameSpec> frames = Arm().frames();
+  live(store, frames, [](Arm& arm) { move_elbow(arm, 0.75, 0); });
+  std::vector<FrameSpec> later = frames;
+  later[2].joint->name = "bend";
+  later[3].joint->mimic->joint = "bend";
+  CHECK(described(*store.load(), later) ==
+        Lines{"frame 'fore': changed to its new entry, under 'upper'",
+              "frame 'hand': starts at its initial position; the stored one is dropped: joint "
+              "'wrist' mimics 'bend', and mimicked 'elbow'"});
+  for (int life = 0; life < 2; ++life) {
+    INFO("life " << life);
+    live(store, later, [&](Arm& arm) {
+      CHECK(stored_joints(store).empty());
+      for (const char* name : {"bend", "wrist"}) CHECK_FALSE(arm.info(name).measured);
+      CHECK(arm.info("wrist").position == later[3].joint->position);
+      CHECK(pose_diff(arm.edge("fore", "hand").pose, value_of(later[3]).pose, 1e-15) == "");
+      CHECK_FALSE(arm.forest.kept("hand")->time.stamp);
+    });
+  }
+  CHECK(described(*store.load(), later).empty());
+}
+
 TEST_CASE("a position is sent to the owners of the joint and of its mimic joints") {
   Replica caller;
   const auto page = [](const std::string& name, std::vector<PageEntry> entries,

@@ -226,6 +226,23 @@ TEST_CASE("erased frames and tombstones are not restored") {
   CHECK(state->tombstones.empty());
 }
 
+TEST_CASE("erased joints are not restored and leave no checksums") {
+  const TemporaryDirectory directory;
+  const std::string file = state_file(directory.path(), 7, "arms");
+  const auto store = opened(file);
+  StateChange change;
+  change.joints = {{"elbow", 0.5, 0}, {"wrist", 0.25, 0}};
+  REQUIRE(store->save(change));
+  change.joints = {{"knee", 0.75, 0}};
+  change.erased_joints = {"elbow", "nobody"};
+  REQUIRE(store->save(change));
+  const auto state = store->load();
+  REQUIRE(state);
+  REQUIRE(state->joints.size() == 2);
+  CHECK(state->joints[0].name == "knee");
+  CHECK(state->joints[1].name == "wrist");
+}
+
 TEST_CASE("a saved state survives a kill of its process") {
   const TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
