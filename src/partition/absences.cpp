@@ -1,6 +1,8 @@
 #include "partition/absences.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <tuple>
 
 namespace tfdude {
 
@@ -8,14 +10,29 @@ void Absences::put(const std::string& partition, std::uint64_t incarnation, Time
                    Absent::Kind kind, Absent::Kind then) {
   const Absent absent{partition, now.time_since_epoch().count(), kind, incarnation};
   missed_[partition] = {absent, then, {}, {}, kind == Absent::Kind::kSilent};
-  limit();
+  limit(partition);
 }
 
-void Absences::limit() {
+// Whom this participant has survived must yield to it: if that is forgotten, changes that it has
+// acknowledged are lost. One that it has not met yet may contest anything. The longer one of those
+// is missed, the more has changed since.
+void Absences::limit(const std::string& kept) {
   if (missed_.size() <= kMost) return;
-  missed_.erase(std::min_element(missed_.begin(), missed_.end(), [](const auto& a, const auto& b) {
-    return a.second.absent.since < b.second.absent.since;
-  }));
+  const auto worth = [&](const auto& entry) {
+    const Missed& missed = entry.second;
+    const std::int64_t since = missed.absent.since;
+    if (entry.first == kept) return std::pair(4, since);
+    if (!missed.teller.empty()) return std::pair(0, since);
+    if (missed.pending) return std::pair(3, since);
+    return contests_(entry.first) ? std::pair(2, ~since) : std::pair(1, since);
+  };
+  auto least = missed_.begin();
+  auto least_worth = worth(*least);
+  for (auto one = std::next(least); one != missed_.end(); ++one) {
+    const auto its = worth(*one);
+    if (its < least_worth) std::tie(least, least_worth) = std::tuple(one, its);
+  }
+  missed_.erase(least);
 }
 
 void Absences::mark_absent(const std::string& partition, std::uint64_t incarnation, bool stopped,
@@ -25,8 +42,7 @@ void Absences::mark_absent(const std::string& partition, std::uint64_t incarnati
   const auto before = missed_.find(partition);
   const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
-  if (const auto there = missed_.find(partition); there != missed_.end())
-    there->second.early = early;
+  missed_.at(partition).early = early;
 }
 
 void Absences::add_report(const Absent& absent, const std::string& teller) {
@@ -36,7 +52,7 @@ void Absences::add_report(const Absent& absent, const std::string& teller) {
   Missed hearsay{silent, absent.kind, {}, teller, true};
   const auto [there, is_new] = missed_.emplace(absent.partition, std::move(hearsay));
   if (!is_new && there->second.then == Absent::Kind::kSilent) there->second.then = absent.kind;
-  if (is_new) limit();
+  if (is_new) limit({});
 }
 
 void Absences::replace_reports(const std::vector<Absent>& absent, const std::string& teller) {
@@ -78,7 +94,7 @@ void Absences::heard_of(const std::string& partition, std::uint64_t incarnation)
 }
 
 void Absences::resume(const Absent& absent) {
-  if (missed_.emplace(absent.partition, Missed{absent, absent.kind, {}}).second) limit();
+  if (missed_.emplace(absent.partition, Missed{absent, absent.kind, {}}).second) limit({});
 }
 
 bool Absences::returned(const std::string& partition) {

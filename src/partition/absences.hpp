@@ -2,9 +2,11 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tfdude/base/time.hpp"
@@ -30,8 +32,14 @@ class Absences {
   /// acknowledges are not lost to a partition that returns in between.
   static constexpr std::chrono::milliseconds kTakeover{700};
 
-  /// Maximum number of entries. The oldest are dropped first.
+  /// Maximum number of entries. Hearsay is dropped first, then partitions that contest nothing
+  /// here, each the oldest first; then the newest of the others.
   static constexpr std::size_t kMost = 256;
+
+  /// @param contests  whether a partition may claim something that this participant holds, or has
+  ///   removed
+  explicit Absences(std::function<bool(const std::string& partition)> contests)
+      : contests_(std::move(contests)) {}
 
   /// A partition no longer sends, or has announced its stop.
   /// @param early  by how much later others may notice it. It counts as gone that much later, so
@@ -104,8 +112,10 @@ class Absences {
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);
-  void limit();
+  /// @param kept  the one entry that stays in any case
+  void limit(const std::string& kept);
 
+  const std::function<bool(const std::string&)> contests_;
   std::map<std::string, Missed> missed_;
   std::optional<Steady> looked_;
 };

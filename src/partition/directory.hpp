@@ -292,6 +292,8 @@ class Directory {
   void forget_if_gone(Known& partition, Time since);
   void hear_of_itself(const std::vector<Absent>& absent);
   [[nodiscard]] std::optional<Absent> told_absence(const Known& partition) const;
+  /// Whether an absent partition may claim what is held here, or was removed here.
+  [[nodiscard]] bool may_contest(const std::string& partition) const;
   bool drop_outdated(Known& partition, std::uint64_t incarnation);
   void came_back(Known& partition, Owner owner);
   void mark_absent(Known& partition, Owner owner, bool stopped, Time now,
@@ -336,7 +338,7 @@ class Directory {
   std::map<std::string, JointUse> joints_;  // by name
   std::map<std::string, std::set<Owner>> contested_joints_;  // those that were reported
   std::uint64_t latest_lamport_time_ = 0;
-  Absences absences_;
+  Absences absences_{[this](const std::string& partition) { return may_contest(partition); }};
   // The latest incarnation of the own partition mentioned by others.
   std::uint64_t own_heard_of_ = 0;
   std::uint64_t own_forgotten_ = 0;  // the latest one that others have forgotten

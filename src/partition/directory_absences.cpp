@@ -31,6 +31,15 @@ std::optional<Absent> Directory::told_absence(const Known& partition) const {
   return has_voice ? absences_.find(partition.info.name) : std::nullopt;
 }
 
+// Nothing is known of one that this process has not met. One that was forgotten must hear of it.
+bool Directory::may_contest(const std::string& partition) const {
+  const auto number = number_of(partition);
+  if (!number) return true;
+  const Known& absent = partitions_[*number];
+  return absent.live == 0 || absent.forgotten || !absent.complete() ||
+         claims_.contests_held(*number);
+}
+
 bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   if (!partition.outdated(incarnation)) return false;
   // A participant that misses it, or has forgotten it, informs it, and it continues with a higher

@@ -2,6 +2,7 @@
 
 #include "partition/absences.hpp"
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,60 @@ TEST_CASE("a short silence changes only whether the partition is reachable") {
   CHECK(base.directory.absent().empty());
   CHECK_FALSE(base.directory.look_for_gone(kStart + 2 * Absences::kGrace));
   CHECK(base.owner_of("hand") == "arm");
+}
+
+TEST_CASE("a partition whose frames were taken over is missed however many others stop") {
+  Witness base;
+  base.lose("arm", 1);
+  base.wait();
+  Partition partition("base", 1, base.forest, base.directory);
+  REQUIRE(partition.load({{"hand", "", {}}}, kNow));
+  auto steady = kStart + Absences::kTakeover;
+  Time now = kNow;
+  const auto stop = [&](const std::string& name) {
+    now += milliseconds(100);
+    Presence other = presence_of(name, 1, 0);
+    base.directory.apply(other, now);
+    other.serving = false;
+    other.stopped = true;
+    base.directory.apply(other, now);
+    (void)base.directory.look_for_gone(steady += milliseconds(100));
+  };
+  const auto misses = [&](const std::string& name) {
+    const auto absent = base.directory.absent();
+    return std::any_of(absent.begin(), absent.end(),
+                       [&](const Absent& one) { return one.partition == name; });
+  };
+  for (std::size_t i = 0; i < Absences::kMost + 20; ++i) stop("other" + std::to_string(i));
+  CHECK(base.directory.absent().size() == Absences::kMost);
+  CHECK(misses("arm"));
+  CHECK_FALSE(misses("other0"));
+  CHECK(misses("other" + std::to_string(Absences::kMost + 19)));
+  SECTION("and yields when it returns") {
+    base.hear("arm", 2, 10);
+    CHECK(base.directory.pending_yields().empty());
+  }
+  SECTION("also if its owner's clock is behind when it forgets another one") {
+    REQUIRE(base.directory.forget("leg", 0, Time{}));
+    CHECK(misses("leg"));
+    CHECK(misses("arm"));
+  }
+  SECTION("also after a restart, whoever is reported then") {
+    Replica next("base");
+    next.directory.restore(base.directory.absent());
+    Presence teller = presence_of("teller", 1, 0);
+    for (int i = 0; i < 20; ++i)
+      teller.absent.push_back({"far" + std::to_string(i), 1, Kind::kLost, 1});
+    next.directory.apply(teller, now);
+    Presence other = presence_of("near", 1, 0);
+    next.directory.apply(other, now);
+    CHECK(next.directory.lost("near", 1, Time{}));
+    const auto absent = next.directory.absent();
+    for (const char* name : {"arm", "near"}) {
+      CHECK(std::any_of(absent.begin(), absent.end(),
+                        [&](const Absent& one) { return one.partition == name; }));
+    }
+  }
 }
 
 TEST_CASE("a frame of an unreachable partition goes to a reachable one and this is reported") {

@@ -194,7 +194,7 @@ TEST_CASE("a reachable partition cannot be forgotten") {
 }
 
 TEST_CASE("the number of absences is bounded") {
-  Absences absences;
+  Absences absences([](const std::string&) { return false; });
   for (std::size_t i = 0; i < 2 * Absences::kMost; ++i) {
     absences.resume({"p" + std::to_string(i), static_cast<std::int64_t>(i), Kind::kLost, 1});
   }
