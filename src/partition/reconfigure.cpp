@@ -36,9 +36,11 @@ bool same_joint(const StoredState& state, const FrameSpec& entry) {
   return name.empty() || (entry.joint && entry.joint->name == name);
 }
 
+// What an unknown entry says now may be what it said: what was set at run time is kept.
 // @param was  the entry of the previous configuration; null: none
 std::optional<Kind> effect(const FrameSpec& entry, const FrameSpec* was, const StoredState& state,
                            bool is_there) {
+  if (state.unknown_entries.count(entry.id) != 0) return std::nullopt;
   if (was == nullptr || !same_edge(*was, entry, state.omitted_was_exact) ||
       !same_joint(state, entry))
     return is_there ? Kind::kReplace : Kind::kAdd;

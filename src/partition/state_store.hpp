@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,8 @@ struct StoredState {
   /// The joints of the entries that have one, by the ids of their frames; without a name: an
   /// earlier version did not store it.
   std::map<std::string, PageJoint> configured_joints{};
+  /// Entries of which only the id is known, because what they said was damaged.
+  std::set<std::string> unknown_entries{};
 };
 
 /// A change of the stored state. With whatever is stored, the values of all edges are, as of the

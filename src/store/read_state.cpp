@@ -74,6 +74,11 @@ Result<void> load_configured(const Database& database, std::int64_t format, Stor
   return each_row(database, sql, [&](const Statement& row) -> Result<void> {
     auto ok = row.check_types({SQLITE_TEXT, SQLITE_TEXT, SQLITE_BLOB});
     if (!ok) return ok;
+    // One that was damaged, see erase_rows().
+    if (row.bytes(2).empty()) {
+      state.unknown_entries.insert(row.text(0));
+      return check_id(row.text(0), "id");
+    }
     auto frame = read_frame(row, state.configured.empty() ? "" : state.configured.back().id);
     if (!frame) return tl::unexpected(std::move(frame.error()));
     state.configured.push_back(*std::move(frame));

@@ -200,6 +200,43 @@ Result<std::vector<WrongRow>> find_wrong_rows(Database& database, std::int64_t f
   return wrong;
 }
 
+namespace {
+
+// What an entry said of the configuration, of which a part is damaged. Its id stays, so that it
+// does not count as new, which would replace what was set at run time.
+Result<void> make_unknown(Database& database, const std::string& id) {
+  if (!check_id(id, "id")) return {};
+  for (const char* sql :
+       {"DELETE FROM configured_ties WHERE id = ?1", "DELETE FROM configured_joints WHERE id = ?1",
+        "INSERT OR REPLACE INTO configured VALUES(?1, '', x'')",
+        "INSERT OR REPLACE INTO sums SELECT 'configured/' || id, row_sum(id, "
+        "parent, x_pc) FROM configured WHERE id = ?1"}) {
+    auto statement = prepared(database, sql);
+    auto done = statement ? statement->run(id) : tl::unexpected(statement.error());
+    if (!done) return done;
+  }
+  return {};
+}
+
+// What is stored beside a correlation is the covariance of the edge's own part, which is too small
+// without it: only the pose stays, in its 7 numbers.
+Result<void> leave_covariance_out(Database& database, const std::string& id) {
+  for (const char* sql : {"UPDATE frames SET x_pc = substr(x_pc, 1, 56) WHERE id = ?1",
+                          "INSERT OR REPLACE INTO sums SELECT 'frames/' || id, row_sum(id, parent, "
+                          "x_pc, since) FROM frames WHERE id = ?1"}) {
+    auto statement = prepared(database, sql);
+    auto done = statement ? statement->run(id) : tl::unexpected(statement.error());
+    if (!done) return done;
+  }
+  return {};
+}
+
+bool is_of_entry(const std::string& table) {
+  return table == "configured" || table == "configured_ties" || table == "configured_joints";
+}
+
+}  // namespace
+
 Result<void> erase_rows(Database& database, const std::vector<WrongRow>& rows) {
   return database.atomically([&]() -> Result<void> {
     for (const WrongRow& row : rows) {
@@ -212,6 +249,12 @@ Result<void> erase_rows(Database& database, const std::vector<WrongRow>& rows) {
         if (auto done = erase->run(row.key); !done) return done;
         if (auto done = sum->run(row.key); !done) return done;
       }
+    }
+    for (const WrongRow& row : rows) {
+      Result<void> done;
+      if (row.table == "ties") done = leave_covariance_out(database, row.key);
+      if (is_of_entry(row.table)) done = make_unknown(database, row.key);
+      if (!done) return done;
     }
     // What belongs to a frame or an entry that is no longer there.
     return database.run(

@@ -47,7 +47,7 @@ struct WrongRow {
 [[nodiscard]] Result<std::vector<WrongRow>> find_wrong_rows(sqlite::Database& database,
                                                             std::int64_t format);
 
-/// Erases these rows, and what belongs to them.
+/// Erases these rows, and what belongs to them. Entries of the configuration become unknown.
 /// @return kState for the row that says whose file it is: nothing can replace that
 [[nodiscard]] Result<void> erase_rows(sqlite::Database& database,
                                       const std::vector<WrongRow>& rows);

@@ -178,6 +178,27 @@ TEST_CASE("an entry of which only the correlation is edited keeps the value") {
   }
 }
 
+TEST_CASE("an entry of which only the id is known undoes nothing") {
+  MemoryStore store;
+  live(store);
+  {
+    Life second(store, {kArm, kHand}, 2);
+    second.ask("hand", MoveRequest{"", along_x(20)});
+    second.ask("arm", RemoveRequest{{"arm"}});
+  }
+  StoredState state = *store.load();
+  state.unknown_entries = {"arm", "hand", "tool"};
+  state.configured.clear();
+  FrameSpec hand = kHand;
+  hand.correlation = kSupply;
+  CHECK(configured_changes(state, {kArm, hand}).empty());
+  Replica arms("arms");
+  Partition partition("arms", 3, arms.forest, arms.directory);
+  REQUIRE(partition.restore(state, {kArm, hand}, kNow));
+  CHECK(arms.structure() == Lines{"hand <  @ arms", "tool < hand @ arms, attached"});
+  CHECK(x_of(arms.forest.kept("hand")->X_PC) == 20);
+}
+
 TEST_CASE("frames of others below a deleted entry stay and their owner reports them") {
   MemoryStore store;
   live(store);

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <set>
 #include <sqlite3.h>
 #include <sstream>
 #include <string>
@@ -102,7 +103,7 @@ struct Saved {
     change.tombstones = {{"lamp", 6, Tombstone::Kind::kRemoved, ""}};
     change.joints = {{"elbow", 0.5, 1e-4, JointType::kPrismatic}};
     change.absent = {{"legs", 5, Absent::Kind::kLost, 7}};
-    change.configured = {{"arm", "", along_x(1)},
+    change.configured = {{"arm", "", along_x(1), {}, {true, {}, {}}},
                          {"hand", "arm", along_x(1)},
                          testing::moved_by("tool", "hand", testing::revolute_named("wrist"))};
     REQUIRE(outcome(open_sqlite_store(file, "arms").value()->save(change)) == "ok");
@@ -153,6 +154,49 @@ TEST_CASE("a changed value is named, and left out if that is wished") {
   const auto state = (*store)->load();
   REQUIRE(state);
   CHECK(state->frames.size() == frames);
+}
+
+TEST_CASE("of a damaged entry of the configuration the id stays") {
+  const auto [sql, unknown] = GENERATE(table<std::string, std::set<std::string>>({
+      {"UPDATE configured SET parent = 'tool' WHERE id = 'hand'", {"hand"}},
+      {"DELETE FROM configured WHERE id = 'arm'", {"arm"}},
+      {"UPDATE configured_joints SET follows = 'elbow'", {"tool"}},
+      {"UPDATE configured_ties SET said = said || x'00'", {"arm"}},
+      {"UPDATE frames SET since = 9 WHERE id = 'hand'", {}},
+  }));
+  const Saved saved;
+  run(saved.file, sql);
+  CAPTURE(sql);
+  REQUIRE(drop_wrong_rows(saved.file, "arms"));
+  const auto state = open_sqlite_store(saved.file, "arms").value()->load();
+  INFO((state ? "" : state.error().message));
+  REQUIRE(state);
+  CHECK(state->unknown_entries == unknown);
+  CHECK(state->configured.size() == 3 - unknown.size());
+  CHECK(state->configured_joints.size() == 1 - unknown.count("tool"));
+  // Until a configuration is saved.
+  StateChange next;
+  next.configured = {{"arm", "", along_x(1)}};
+  REQUIRE(outcome(open_sqlite_store(saved.file, "arms").value()->save(next)) == "ok");
+  const auto later = open_sqlite_store(saved.file, "arms").value()->load();
+  REQUIRE(later);
+  CHECK(later->unknown_entries.empty());
+  CHECK(later->configured.size() == 1);
+}
+
+TEST_CASE("an edge whose correlation was damaged keeps its pose and claims no covariance") {
+  const Saved saved;
+  const auto tool = [&] {
+    const auto state = open_sqlite_store(saved.file, "arms").value()->load();
+    REQUIRE(state);
+    return state->frames.at(2);
+  };
+  CHECK(tool().X_PC.covariance.complete());
+  run(saved.file, "UPDATE ties SET said = said || x'00'");
+  REQUIRE(drop_wrong_rows(saved.file, "arms"));
+  CHECK(tool().X_PC.pose.translation() == along_x(3).pose.translation());
+  CHECK_FALSE(tool().X_PC.covariance.complete());
+  CHECK(tool().correlation.empty());
 }
 
 TEST_CASE("whose state it is cannot be left out") {
