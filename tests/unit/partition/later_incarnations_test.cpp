@@ -141,5 +141,21 @@ TEST_CASE("a restarted process restores the absences of its predecessor") {
   CHECK(replica.directory.latest_incarnation("arm") == 7);
 }
 
+TEST_CASE("a restarted process yields to whom it meets, also to one that it missed before") {
+  const std::vector<Absent> missed{{"arm", 5, Kind::kLost, 1}};
+  SECTION("it meets it") {
+    Witness base;
+    base.directory.restore(missed);
+    CHECK(base.directory.absent().empty());
+    CHECK_FALSE(base.directory.take("hand"));
+  }
+  SECTION("it does not") {
+    Replica base("base");
+    base.directory.restore(missed);
+    CHECK(base.directory.absent().size() == 1);
+    CHECK(base.directory.take("hand"));
+  }
+}
+
 }  // namespace
 }  // namespace tfdude
