@@ -229,7 +229,9 @@ std::optional<Presence> Member::stored(const Ready& ready) {
   }
   if (!stands && !ready.refused) return std::nullopt;
   announced_ = presence_;
-  return presence_;
+  // If this process was overtaken meanwhile, its new number is not stored yet.
+  if (stands) announced_.incarnation = ready.presence->incarnation;
+  return announced_;
 }
 
 std::optional<Presence> Member::not_stored(const Ready& ready) {

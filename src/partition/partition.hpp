@@ -102,6 +102,7 @@ class Partition {
   void overtake(std::uint64_t incarnation) {
     pages_.overtake(incarnation);
     saved_absent_.reset();
+    overtook_ = true;
   }
 
   /// The pages to publish since the last call.
@@ -180,6 +181,7 @@ class Partition {
   Consistency consistency_;
   bool saved_ = false;
   bool values_asked_ = false;       // a request waits until its values are saved
+  bool overtook_ = false;           // since it was last saved
   std::uint64_t saved_commit_ = 0;  // up to which the values are
   std::set<std::string> unsaved_;   // what could not be saved
   std::optional<std::vector<Absent>>

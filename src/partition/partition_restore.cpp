@@ -287,6 +287,7 @@ StateChange Partition::take_unsaved(bool values_due) {
     change.absent = std::move(absent);
   }
   change.erased_joints = joints_.take_erased();
+  change.synced = std::exchange(overtook_, false);
   change.configured = std::exchange(configured_, std::nullopt);
   const bool values_asked = std::exchange(values_asked_, false);
   change.commits = {saved_commit_, saved_commit_};
@@ -301,6 +302,7 @@ void Partition::still_unsaved(const StateChange& change, const std::vector<Page>
   unsaved_.insert(change.erased.begin(), change.erased.end());
   joints_.still_changed(change.joints);
   joints_.still_erased(change.erased_joints);
+  overtook_ = overtook_ || change.synced;
   if (change.absent) saved_absent_.reset();
   if (change.configured) configured_ = change.configured;
   values_asked_ = values_asked_ || change.commits.last > change.commits.after;

@@ -63,6 +63,8 @@ struct StateChange {
   CommitRange commits{};              ///< which have written these values
   std::optional<std::vector<FrameSpec>> configured{};  ///< the configuration, at the start
   std::vector<std::string> erased_joints{};            ///< applied before the new positions
+  /// It has a number of this process that others will know: it must survive a power loss, too.
+  bool synced = false;
 
   [[nodiscard]] bool empty() const {
     return erased.empty() && joints.empty() && !absent && values.empty() && !configured &&
@@ -79,7 +81,7 @@ class StateStore {
   [[nodiscard]] virtual Result<StoredState> load() = 0;
 
   /// Saves all of it or nothing. Saved changes survive the end of the process at any instant; the
-  /// first change of a process survives a power loss, too.
+  /// first change of a process, and one that says so, survive a power loss, too.
   /// @return kState.
   [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
 };

@@ -312,6 +312,11 @@ Result<void> SqliteStore::make_ready() {
 Result<void> SqliteStore::save(const StateChange& change) {
   if (auto ready = make_ready(); !ready)
     return unusable("cannot be written: " + ready.error().message);
+  const bool relaxed = written_ && sync_ == StoreSync::kAtCheckpoints;
+  if (relaxed && change.synced) {
+    if (auto strict = database_->run("PRAGMA synchronous = FULL;"); !strict)
+      return unusable("could not be written: " + strict.error().message);
+  }
   auto done = database_->atomically([&]() -> Result<void> {
     Result<void> saved = save_frames(change);
     if (saved && change.absent) saved = save_absent(*change.absent);
@@ -320,9 +325,9 @@ Result<void> SqliteStore::save(const StateChange& change) {
     if (saved) saved = save_joints(change.joints);
     return saved && change.configured ? save_configured(*change.configured) : saved;
   });
-  // The first change of a process is synced: it has the process's number, which others will know.
-  // After a power loss the clock may be behind it.
-  if (done && !written_ && sync_ == StoreSync::kAtCheckpoints) {
+  // The first change of a process is synced, and each with a new number of it: others will know the
+  // number. After a power loss the clock may be behind it.
+  if (done && sync_ == StoreSync::kAtCheckpoints && (!written_ || change.synced)) {
     done = database_->run("PRAGMA synchronous = NORMAL;");
   }
   written_ = written_ || done;

@@ -273,6 +273,34 @@ TEST_CASE("member: an incarnation that could not be stored is not announced") {
   CHECK(later->incarnation > own);
 }
 
+TEST_CASE("member: an incarnation is not announced before it is stored and synced") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  arms.member.on_presence(presence_of("base", 1, 0), kNow);
+  arms.member.on_lost("base", 1, kNow);
+  const Ready ready = arms.member.take_ready();
+  REQUIRE(ready.presence);
+  CHECK_FALSE(ready.rows.synced);
+  // While the disk writes.
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arms", 1, Absent::Kind::kForgotten, own}};
+  arms.member.on_presence(head, kNow);
+  CHECK(arms.member.take_outcome().overtook);
+  const auto said = arms.member.stored(ready);
+  REQUIRE(said);
+  CHECK(said->incarnation == own);
+  CHECK(said->absent.size() == 1);
+  const Ready next = arms.member.take_ready();
+  CHECK(next.rows.synced);
+  (void)arms.member.not_stored(next);
+  const Ready again = arms.member.take_ready();
+  CHECK(again.rows.synced);
+  const auto later = arms.member.stored(again);
+  REQUIRE(later);
+  CHECK(later->incarnation > own);
+  CHECK_FALSE(arms.member.take_ready().rows.synced);
+}
+
 TEST_CASE("member: it gives up its partition when a later process of it appears") {
   Serving arms;
   CHECK_FALSE(arms.ask(1, "hand", AddRequest{"arm", along_x(1)}));

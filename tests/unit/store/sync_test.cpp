@@ -26,7 +26,9 @@ extern "C" int fdatasync(int file) { return sync(SYS_fdatasync, file); }
 
 namespace tfdude {
 
-TEST_CASE("the first change of a process is synced and the others only with sync") {
+TEST_CASE(
+    "the first change of a process, and each with a new number of it, is synced without sync, "
+    "too") {
   const testing::TemporaryDirectory directory;
   const std::string file = state_file(directory.path(), 7, "arms");
   const auto sync = GENERATE(StoreSync::kAtCheckpoints, StoreSync::kEachChange);
@@ -34,14 +36,18 @@ TEST_CASE("the first change of a process is synced and the others only with sync
   for (int process = 0; process < 2; ++process) {
     const auto store = open_sqlite_store(file, "arms", sync);
     REQUIRE(store);
-    const auto save = [&] {
+    const auto save = [&](bool new_number = false) {
+      StateChange change{1, {"hand"}, {{"hand", "", {}, 1}}, {}};
+      change.synced = new_number;
       const int before = synced;
-      REQUIRE((*store)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+      REQUIRE((*store)->save(change));
       return synced > before;
     };
     CHECK(save());
     const bool again = save();
     CHECK(again == (sync == StoreSync::kEachChange));
+    CHECK(save(true));
+    CHECK(save() == again);
   }
 }
 
