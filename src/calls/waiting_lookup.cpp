@@ -49,17 +49,17 @@ WaitingLookup::Answer WaitingLookup::attempt(const Shared& shared, const News& n
   plan_.emplace(*std::move(plan));
   const TimeLimit until(shared.timeout, now);
   until_ = until.at() < limit_.at() ? until : limit_;
-  return ask(shared, news, now);
+  return ask(shared, news, false, now);
 }
 
-WaitingLookup::Answer WaitingLookup::ask(const Shared& shared, const News& news,
+WaitingLookup::Answer WaitingLookup::ask(const Shared& shared, const News& news, bool again,
                                          Clock::time_point now) {
   asking_.emplace(shared.replies, plan_->parts(), until_, shared.listener);
   if (const Error* lacking = asking_->answer(shared.link)) {
-    // No other owner is asked in vain.
+    // No other owner is asked in vain. If another one determined the instant, its data is missing.
     Error error = *lacking;
     asking_.reset();
-    return judge(shared, news, tl::unexpected(std::move(error)), false, now);
+    return judge(shared, news, tl::unexpected(std::move(error)), again, now);
   }
   return go_on_asking(shared, news, now);
 }
@@ -80,7 +80,7 @@ WaitingLookup::Answer WaitingLookup::go_on_asking(const Shared& shared, const Ne
   }
   auto found = plan_->take(asking_->take_replies(), shared.hints, now);
   asking_.reset();
-  return found ? judge(shared, news, *std::move(found), true, now) : ask(shared, news, now);
+  return found ? judge(shared, news, *std::move(found), true, now) : ask(shared, news, true, now);
 }
 
 WaitingLookup::Answer WaitingLookup::judge(const Shared& shared, const News& news, Found found,
@@ -89,8 +89,8 @@ WaitingLookup::Answer WaitingLookup::judge(const Shared& shared, const News& new
   last_ = std::move(found.error());
   if (limit_.over(now)) return Found(tl::unexpected(shared.host.last_word(last_, limit_)));
   far_ = far;
-  next_ = next_attempt(shared, news, now);
-  // The data may have come during the request.
+  // What plan() would find may have changed during the request, and the data may have come.
+  next_ = version_ != news.version ? now : next_attempt(shared, news, now);
   if (far) hurry(shared, now);
   return std::nullopt;
 }

@@ -84,7 +84,9 @@ class WaitingLookup {
   using Answer = std::optional<Found>;
 
   [[nodiscard]] Answer attempt(const Shared& shared, const News& news, Clock::time_point now);
-  [[nodiscard]] Answer ask(const Shared& shared, const News& news, Clock::time_point now);
+  /// @param again  for the instant that the first answers have determined
+  [[nodiscard]] Answer ask(const Shared& shared, const News& news, bool again,
+                           Clock::time_point now);
   [[nodiscard]] Answer go_on_asking(const Shared& shared, const News& news, Clock::time_point now);
   [[nodiscard]] Answer judge(const Shared& shared, const News& news, Found found, bool far,
                              Clock::time_point now);

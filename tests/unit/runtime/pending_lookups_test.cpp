@@ -145,6 +145,30 @@ TEST_CASE("lookups: an owner without the requested sample is asked less and less
   CHECK(later.get()->pose.translation().x() == Approx(2));
 }
 
+TEST_CASE("lookups: owners are asked again for the instant that another owner determined") {
+  Robot robot;
+  auto transport = std::make_unique<Deaf>(robot.network.join());
+  Deaf& ear = *transport;
+  Node tool = *Node::open(std::move(transport), "tool", {{"tool", "arm", {}}});
+  // The arm has nothing as new as what the tool has, and the tool nothing as old.
+  REQUIRE(robot.arm->update("arm", along_x(1), Time(90s)));
+  REQUIRE(tool.update("tool", along_x(1), Time(100s)));
+  const int before = ear.requests;
+  auto found = tool.lookup_async("base", "tool", {}, kForEver);
+  // Own commits do not make it ask more often.
+  const auto until = Clock::now() + 300ms;
+  Time newest(100s);
+  while (Clock::now() < until) {
+    newest += 10us;
+    REQUIRE(tool.update("tool", along_x(1), newest));
+  }
+  CHECK(ear.requests - before > 10);
+  CHECK(ear.requests - before < 100);
+  REQUIRE(robot.arm->update("arm", along_x(2), newest));
+  REQUIRE(found.wait_for(10s) == std::future_status::ready);
+  CHECK(outcome(found.get()) == "ok");
+}
+
 TEST_CASE("lookups: a lookup ends at its maximum wait although an owner does not respond") {
   Options options;
   options.timeout = Milliseconds(20000);
