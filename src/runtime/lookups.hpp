@@ -75,6 +75,9 @@ class Lookups final : private LookupHost {
                                                             const std::string& b,
                                                             const Query& query, Milliseconds wait);
 
+  /// As PendingLookups::pause().
+  [[nodiscard]] bool pause(Deadline::Clock::time_point until) { return pending_.pause(until); }
+
   /// What a plan would find has changed.
   void look_again() { pending_.look_again(); }
   /// Others have pushed values.

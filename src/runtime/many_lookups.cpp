@@ -13,6 +13,10 @@
 namespace tfdude {
 namespace {
 
+// Between two rounds of lookups that wait, at least: at first, and at most.
+constexpr Milliseconds kShortestPause{1};
+constexpr Milliseconds kLongestPause{50};
+
 bool is_of_time(Errc code) { return code == Errc::kNotYet || code == Errc::kTooOld; }
 
 }  // namespace
@@ -33,13 +37,16 @@ std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<Frame
 std::vector<ManyLookups::Found> ManyLookups::lookup(const std::vector<FramePair>& pairs,
                                                     const Query& query, Milliseconds wait) {
   const Deadline until(wait);
-  while (true) {
+  for (auto pause = kShortestPause;; pause = std::min(2 * pause, kLongestPause)) {
     auto found = lookup_once(pairs, query, discovery_.call_deadline());
     if (wait <= Milliseconds(0) || until.over()) return found;
     std::size_t i = 0;
     while (i < found.size() && (found[i] || !is_worth_waiting(found[i].error(), query))) ++i;
     if (i == found.size()) return found;
+    // Alone it may have an answer at once, but not at the instant of the others.
+    const auto next = std::min(Deadline(pause).at(), until.at());
     (void)lookups_.wait(pairs[i].a, pairs[i].b, query, until.left());
+    if (!lookups_.pause(next)) return found;
   }
 }
 

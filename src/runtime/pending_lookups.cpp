@@ -30,6 +30,7 @@ void PendingLookups::stop() {
     const Lock lock(mutex_);
     stopping_ = true;
   }
+  stopped_.notify_all();
   attends_.stop();
   shared_.forest.on_commit(nullptr, this);
   All left = std::exchange(all_, {});
@@ -40,6 +41,11 @@ void PendingLookups::stop() {
   }
   // Here, since objects that callbacks own are destroyed with them.
   for (const auto& lookup : left) give_up(*lookup);
+}
+
+bool PendingLookups::pause(Clock::time_point until) {
+  Lock lock(mutex_);
+  return !stopped_.wait_until(lock, until, [this]() TFDUDE_REQUIRES(mutex_) { return stopping_; });
 }
 
 void PendingLookups::give_up(Lookup& lookup) {

@@ -39,6 +39,9 @@ class PendingLookups final : private ReplyListener {
   /// Waiting lookups get kTimeout; their callbacks are not called.
   void stop();
 
+  /// For calls that look up in rounds: waits until this time. @return false, at once, after stop()
+  [[nodiscard]] bool pause(Clock::time_point until);
+
   /// @param last  why there was no answer so far
   [[nodiscard]] std::future<Found> add(WantedLookup wanted, const Deadline& deadline, Error last);
   /// @return what calls the callback; closing it cancels the lookup
@@ -85,6 +88,7 @@ class PendingLookups final : private ReplyListener {
   std::atomic<bool> urgent_{false};       // a new lookup or a reply has arrived
   std::atomic<bool> waiting_{false};      // there are lookups
   Mutex mutex_;
+  Condition stopped_;
   All added_ TFDUDE_GUARDED_BY(mutex_);  // not yet taken by the job
   bool stopping_ TFDUDE_GUARDED_BY(mutex_) = false;
   // The following belong to the job.

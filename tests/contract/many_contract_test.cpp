@@ -111,6 +111,28 @@ TEST_CASE("many: all pairs are looked up at one instant, with one request to eac
   }
 }
 
+TEST_CASE(
+    "many: rounds pause for a pair that has an answer, but not at the instant of the others") {
+  using namespace std::chrono_literals;
+  const auto join = testing::join_loopback();
+  Node node = Node::open(join("base"), "base",
+                         {{"world", "", {}}, {"old", "world", {}}, {"new", "world", {}}})
+                  .value();
+  REQUIRE(node.update("old", {}, instant(0)));
+  for (int k = 0; k < 5; ++k) REQUIRE(node.update("new", {}, instant(1000 + k)));
+  Counting counting(join(""));
+  REQUIRE(counting.client.lookup("world", "old"));
+  counting.asked = 0;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto found = counting.client.lookup_many("world", {"new", "old"}, {}, 500ms);
+  CHECK(std::chrono::steady_clock::now() - begin >= 500ms);
+  CHECK(found[0]);
+  REQUIRE_FALSE(found[1]);
+  CHECK(found[1].error().code == Errc::kTooOld);
+  // Some 16 rounds of a few requests each.
+  CHECK(counting.asked < 300);
+}
+
 TEST_CASE("many: a pair without an answer has its own error, and does not delay the others") {
   const auto join = testing::join_loopback();
   Random random(4602);
