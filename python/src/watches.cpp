@@ -86,11 +86,14 @@ StampedTransform wait_next(Path& self, py::handle timeout) {
   while (true) {
     const auto left = std::chrono::ceil<Milliseconds>(end - Steady::now());
     const Milliseconds slice = std::max(std::min(left, kLook), Milliseconds(0));
+    const Steady::time_point until = Steady::now() + slice;
     auto next = without_gil([&] { return self.watch.wait_next(slice); });
     if (next) return *std::move(next);
     check_interrupted();
     self.check_open();
-    if (!forever && left <= slice) raise(of_whole_wait(next.error(), slice, wait));
+    // Before the end of the slice: the path has ended.
+    const bool is_last = (!forever && left <= slice) || Steady::now() < until;
+    if (is_last) raise(of_whole_wait(next.error(), slice, wait));
   }
 }
 

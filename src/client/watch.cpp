@@ -27,7 +27,7 @@ bool PathWatch::wait_for_more(std::uint64_t messages,
 Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
   const Deadline deadline(wait);
   for (bool more = returned_.has_value();; more = true) {
-    const std::uint64_t messages = this->messages();
+    const WatchedPath::Heard heard = path_->heard();
     auto newest = latest();
     if (newest && !(returned_ && is_same_value(*returned_, *newest))) {
       returned_ = *newest;
@@ -35,7 +35,8 @@ Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
     }
     // Once the client has ended there is nothing to wait for.
     if (!newest && (more || newest.error().code == Errc::kTransport)) return newest;
-    if (path_->wait_for_more(messages, deadline.at())) continue;
+    if (path_->wait_for_news(heard, deadline.at())) continue;
+    if (auto ended = path_->ended()) return tl::unexpected(*std::move(ended));
     if (!newest) return newest;
     return fail(Errc::kTimeout,
                 "nothing new of the " + path_->described() + " within " + deadline.text());

@@ -81,8 +81,9 @@ Reply Participant::answer_own(const Request& request) {
 }
 
 Participant::~Participant() {
-  // Callbacks may use all other parts.
+  // Callbacks may use all other parts, but wait no longer.
   lookups_.stop();
+  watches_.end_waits();
   one_shots_.stop();
   memory_.stop();
   member_.stop_events();

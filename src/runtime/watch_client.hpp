@@ -24,6 +24,9 @@ class WatchClient final : private WatchLink {
   WatchClient(const WatchClient&) = delete;
   WatchClient& operator=(const WatchClient&) = delete;
 
+  /// Before stop(): calls that wait for what is watched return now, and those that follow at once.
+  void end_waits() { rounds_.end_waits(); }
+
   /// After it has returned nothing new comes. Call from one thread; nothing may be watched
   /// afterwards.
   void stop();

@@ -15,6 +15,16 @@ constexpr Milliseconds kRenewAgainAfter{50};
 
 }  // namespace
 
+void WatchRounds::end_waits() {
+  Entries all;
+  {
+    const Lock lock(mutex_);
+    waits_ended_ = true;
+    all = entries_;
+  }
+  for (const auto& entry : all) entry->watched->end_waits();
+}
+
 void WatchRounds::end() {
   Entries all;
   {
@@ -27,6 +37,8 @@ void WatchRounds::end() {
 void WatchRounds::add(std::shared_ptr<Watched> watched) {
   {
     const Lock lock(mutex_);
+    // Its own lock is of a later rank.
+    if (waits_ended_) watched->end_waits();
     entries_.push_back(std::make_shared<Entry>(std::move(watched)));
   }
   watches_ = true;

@@ -43,6 +43,8 @@ class WatchRounds {
   /// @param timeout  of the requests of a round
   WatchRounds(ReplyTable& replies, Milliseconds timeout) : replies_(replies), timeout_(timeout) {}
 
+  /// Nobody waits for what is watched any more, or will be.
+  void end_waits();
   /// What is watched reports that nothing new comes. Not while a round runs.
   void end();
 
@@ -100,6 +102,7 @@ class WatchRounds {
   const Milliseconds timeout_;
   mutable Mutex mutex_{LockRank::kParts};
   Entries entries_ TFDUDE_GUARDED_BY(mutex_);
+  bool waits_ended_ TFDUDE_GUARDED_BY(mutex_) = false;
   std::atomic<bool> watches_{false};  // or has watched before
   std::atomic<bool> replan_{false};
   std::atomic<Clock::time_point> begun_{Clock::time_point::min()};  // the last round

@@ -51,6 +51,8 @@ class Watched {
 
   /// Applies pushed values, or a reply. @return whether values are missing, which must be requested
   virtual bool take(const PushedValues& pushed, Clock::time_point now) = 0;
+  /// The client ends: nobody waits for values any more.
+  virtual void end_waits() {}
   /// Nothing comes any more, as the client has ended.
   virtual void end() = 0;
   /// Where functions of the user are called, which are destroyed with this; null: it has none.

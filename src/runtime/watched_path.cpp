@@ -244,6 +244,7 @@ void WatchedPath::collect() {
 void WatchedPath::interrupt(Error why) {
   {
     const Lock lock(mutex_);
+    if (live()) ends_.fetch_add(1, std::memory_order_relaxed);
     why_not_ = std::move(why);
     next_.reset();
     memory_.store(nullptr, std::memory_order_seq_cst);
@@ -367,7 +368,8 @@ bool WatchedPath::on_denied(const Part& part, const Error* why) {
 }
 
 void WatchedPath::end() {
-  interrupt({Errc::kTransport, "the client of this watched path has ended"});
+  end_waits();
+  interrupt(*ended());
   if (others_ == nullptr) return;
   // Lookups that have begun before.
   const std::uint64_t tag = epoch::retire_tag();

@@ -71,7 +71,18 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
 
   [[nodiscard]] Result<void> health() const;
   [[nodiscard]] std::uint64_t messages() const { return messages_.load(std::memory_order_relaxed); }
+  /// What there is to hear of: the numbers of messages, and of ends of the path.
+  struct Heard {
+    std::uint64_t messages = 0;
+    std::uint64_t ends = 0;
+  };
+  [[nodiscard]] Heard heard() const { return {messages(), ends_.load(std::memory_order_relaxed)}; }
+  /// @return false at the deadline, or if the client ends
   [[nodiscard]] bool wait_for_more(std::uint64_t messages, Clock::time_point deadline) const;
+  /// As wait_for_more(), but also returns if the path ends.
+  [[nodiscard]] bool wait_for_news(const Heard& before, Clock::time_point deadline) const;
+  /// Why nothing is waited for any more; nothing while the client has not ended.
+  [[nodiscard]] std::optional<Error> ended() const;
   /// See PathWatch::on_news(). @return keeps the listener; it may outlive this object
   [[nodiscard]] std::shared_ptr<void> on_news(Listener listener);
   /// See PathWatch::on_value(). @return ends it
@@ -90,6 +101,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] Result<WatchRoute> route(const KnownStructure& known) const;
 
   bool take(const PushedValues& pushed, Clock::time_point now) override;
+  void end_waits() override;
   /// After it has returned, no memory of others is read.
   void end() override;
   [[nodiscard]] std::shared_ptr<Callbacks::Line> calls_on() const override {
@@ -199,6 +211,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
+  std::atomic<std::uint64_t> ends_{0};  // how often it had no answer any more
   // The latest instant [ns] that was read in memory: what is shown instead is not older.
   mutable std::atomic<std::int64_t> latest_read_{std::numeric_limits<std::int64_t>::min()};
   const std::shared_ptr<Listeners> listeners_ = std::make_shared<Listeners>();
@@ -206,7 +219,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<MemoryReads*> memory_{nullptr};    // instead of a mirror
   WatchRoute planned_;                           // until it is adopted; belongs to the rounds
   bool planned_in_memory_ = false;               // likewise
-  mutable Condition changed_;                    // of messages_, shown_
+  mutable Condition changed_;                    // of messages_, ends_, shown_, ended_
   mutable Mutex mutex_{LockRank::kWatchedPath};  // guards the following members
   std::unique_ptr<WatchMirror> followed_ TFDUDE_GUARDED_BY(mutex_);
   std::unique_ptr<WatchMirror> next_ TFDUDE_GUARDED_BY(mutex_);  // shown once it has all values
@@ -222,6 +235,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   Clock::time_point tell_from_ TFDUDE_GUARDED_BY(mutex_) = Clock::time_point::min();
   std::optional<Clock::time_point> not_connected_since_ TFDUDE_GUARDED_BY(mutex_);
   Error why_not_ TFDUDE_GUARDED_BY(mutex_);
+  bool ended_ TFDUDE_GUARDED_BY(mutex_) = false;
   Result<void> health_ TFDUDE_GUARDED_BY(mutex_);
 };
 

@@ -6,6 +6,11 @@
 
 // Those who wait for something new of a watched path.
 namespace tfdude {
+namespace {
+
+Error has_ended() { return {Errc::kTransport, "the client of this watched path has ended"}; }
+
+}  // namespace
 
 std::shared_ptr<void> WatchedPath::on_news(Listener listener) {
   const Lock lock(listeners_->mutex);
@@ -75,17 +80,39 @@ void WatchedPath::tell() {
 }
 
 bool WatchedPath::wait_for_more(std::uint64_t messages, Clock::time_point deadline) const {
+  return wait_for_news({messages, UINT64_MAX}, deadline);
+}
+
+bool WatchedPath::wait_for_news(const Heard& before, Clock::time_point deadline) const {
+  const auto is_new = [&] {
+    const Heard now = heard();
+    return now.messages > before.messages || now.ends > before.ends;
+  };
   Lock lock(mutex_);
-  return changed_.wait_until(lock, deadline, [&] { return this->messages() > messages; });
+  changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) { return ended_ || is_new(); });
+  return is_new();
+}
+
+void WatchedPath::end_waits() {
+  {
+    const Lock lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+}
+
+std::optional<Error> WatchedPath::ended() const {
+  const Lock lock(mutex_);
+  return ended_ ? std::optional(has_ended()) : std::nullopt;
 }
 
 Result<void> WatchedPath::wait_until_live(Clock::time_point deadline) const {
   Lock lock(mutex_);
   changed_.wait_until(lock, deadline, [&]() TFDUDE_REQUIRES(mutex_) {
-    return in_memory() || (followed_ != nullptr && !followed_->lacks_history());
+    return ended_ || in_memory() || (followed_ != nullptr && !followed_->lacks_history());
   });
   if (live()) return {};
-  return tl::unexpected(why_not_);
+  return tl::unexpected(ended_ ? has_ended() : why_not_);
 }
 
 }  // namespace tfdude

@@ -128,6 +128,28 @@ TEST_CASE("waiting: wait_next() of a client that has ended does not wait") {
   CHECK(std::chrono::steady_clock::now() - begin < 10s);
 }
 
+TEST_CASE("waiting: wait_next() returns when the path or the client ends meanwhile") {
+  World world;
+  auto client = std::make_unique<Client>(Client::open(world.join("")).value());
+  auto watch = client->watch("world", "base", {}, 20s);
+  REQUIRE(watch);
+  REQUIRE(watch->wait_next(20s));
+  const auto begin = std::chrono::steady_clock::now();
+  SECTION("the path") {
+    const auto gone =
+        after([&] { return watch->wait_next(20s); }, [&] { CHECK(world.node.remove("base")); });
+    REQUIRE_FALSE(gone);
+    CHECK(gone.error().code == Errc::kUnknownEnd);
+  }
+  SECTION("the client") {
+    const auto ended = after([&] { return watch->wait_next(20s); }, [&] { client.reset(); });
+    REQUIRE_FALSE(ended);
+    CHECK(ended.error().code == Errc::kTransport);
+    CHECK_FALSE(watch->wait_for_more(watch->messages(), begin + 20s));
+  }
+  CHECK(std::chrono::steady_clock::now() - begin < 10s);
+}
+
 TEST_CASE("waiting: wait_next() returns each new value once, and the newest of several") {
   World world;
   REQUIRE(world.node.update("base", ahead(1), instant(0)));

@@ -47,7 +47,8 @@ class TFDUDE_EXPORT PathWatch {
   /// The number of received messages with new data.
   [[nodiscard]] std::uint64_t messages() const;
 
-  /// Waits until messages() exceeds the given number; false at the deadline.
+  /// Waits until messages() exceeds the given number; false at the deadline, or when the client
+  /// ends.
   [[nodiscard]] bool wait_for_more(std::uint64_t messages,
                                    std::chrono::steady_clock::time_point deadline) const;
 
@@ -56,7 +57,8 @@ class TFDUDE_EXPORT PathWatch {
   /// between two calls are not queued; the newest is returned. So nothing is new while an owner of
   /// the path is gone: health() says which. One thread at a time; each copy of this object has its
   /// own place.
-  /// @return as latest(); kTimeout: nothing new within `wait`
+  /// @return as latest(), with the reason as soon as the path or the client ends; kTimeout: nothing
+  ///   new within `wait`
   [[nodiscard]] Result<StampedTransform> wait_next(Milliseconds wait);
 
   /// Calls a function with the newest value, if there is one, and then when there is another one,

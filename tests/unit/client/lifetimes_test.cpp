@@ -64,6 +64,28 @@ struct Held {
 
 }  // namespace
 
+TEST_CASE("lifetimes: closing a client ends what its callbacks wait for") {
+  Pair pair;
+  const int what = GENERATE(0, 1);
+  REQUIRE(pair.node.add("hand", "arm", {}));
+  std::atomic<bool> begun{false};
+  Result<StampedTransform> got;
+  auto pending = pair.client->lookup_async("arm", "hand", {}, kForEver, [&](const auto&) {
+    Client& client = *pair.client;
+    auto watch = client.watch("arm", "hand");
+    if (!watch || !watch->wait_next(20s)) return;
+    begun = true;
+    got =
+        what == 0 ? client.lookup_many("arm", {"nobody"}, {}, 20s).front() : watch->wait_next(20s);
+  });
+  REQUIRE(eventually([&] { return begun.load(); }));
+  const auto begin = std::chrono::steady_clock::now();
+  pair.client.reset();
+  CHECK(std::chrono::steady_clock::now() - begin < 10s);
+  REQUIRE_FALSE(got);
+  CHECK(got.error().code == (what == 0 ? Errc::kUnknownEnd : Errc::kTransport));
+}
+
 TEST_CASE("lifetimes: no listener runs after its client has ended even if changes wait") {
   Pair pair;
   std::atomic<int> called{0};
