@@ -1,6 +1,25 @@
 #include "calls/tasks.hpp"
 
+#include <algorithm>
+
 namespace tfdude {
+namespace {
+
+const std::string& name_of(const JointValue& joint) { return joint.name; }
+template <class Edge>
+const std::string& name_of(const Edge& edge) {
+  return edge.id;
+}
+
+// Calls a function with the values that a request changes, if it may be one of several.
+template <class Body, class Use>
+void with_values(Body& body, Use use) {
+  if (auto* update = std::get_if<UpdateRequest>(&body)) return use(update->edges);
+  if (auto* partial = std::get_if<PartialUpdateRequest>(&body)) return use(partial->edges);
+  if (auto* joints = std::get_if<JointUpdate>(&body)) return use(joints->joints);
+}
+
+}  // namespace
 
 Result<void> outcome_of(const std::vector<Reply>& replies) {
   Result<void> outcome;
@@ -11,6 +30,35 @@ Result<void> outcome_of(const std::vector<Reply>& replies) {
     }
   }
   return outcome;
+}
+
+void AppliedValues::note(const std::vector<Part>& parts, const std::vector<Reply>& replies) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    if (std::holds_alternative<Error>(replies[i].body)) continue;
+    with_values(parts[i].request.body, [&](const auto& values) {
+      for (const auto& value : values) applied_.emplace(parts[i].owner, name_of(value));
+    });
+  }
+}
+
+void AppliedValues::leave_out(std::vector<Part>& parts) const {
+  if (applied_.empty()) return;
+  const auto is_done = [&](Part& part) {
+    bool done = false;
+    with_values(part.request.body, [&](auto& values) {
+      const auto left = std::remove_if(values.begin(), values.end(), [&](const auto& value) {
+        return applied_.count({part.owner, name_of(value)}) != 0;
+      });
+      values.erase(left, values.end());
+      done = values.empty();
+      // A request for edges has the id of its first one, another that of the partition.
+      if (!done && !std::holds_alternative<JointUpdate>(part.request.body)) {
+        part.request.id = name_of(values.front());
+      }
+    });
+    return done;
+  };
+  parts.erase(std::remove_if(parts.begin(), parts.end(), is_done), parts.end());
 }
 
 Result<void> CatchUpTask::plan(const Directory& directory, Clock::time_point) {

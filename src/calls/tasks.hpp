@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -45,6 +46,19 @@ class RoutedTask : public Task {
   std::vector<Part> parts_;
 };
 
+/// The values that owners have applied of a change that must be planned again as others have not: a
+/// second sample of their stamp would be rejected.
+class AppliedValues {
+ public:
+  void note(const std::vector<Part>& parts, const std::vector<Reply>& replies);
+  /// Leaves out of a new plan what its owner has applied.
+  void leave_out(std::vector<Part>& parts) const;
+
+ private:
+  // Edges or joints: no change has both.
+  std::set<std::pair<Owner, std::string>> applied_;
+};
+
 /// A change of frames or values.
 template <class Route>
 class ChangeTask final : public RoutedTask<Route> {
@@ -52,10 +66,21 @@ class ChangeTask final : public RoutedTask<Route> {
   using RoutedTask<Route>::RoutedTask;
 
   [[nodiscard]] bool changes() const override { return true; }
+  [[nodiscard]] Result<void> plan(const Directory& directory,
+                                  Task::Clock::time_point now) override {
+    auto planned = RoutedTask<Route>::plan(directory, now);
+    if (planned) applied_.leave_out(this->parts());
+    return planned;
+  }
   [[nodiscard]] Result<Task::Next> take(std::vector<Reply> replies,
                                         Task::Clock::time_point) override {
-    return outcome_of(replies).map([] { return Task::Next::kDone; });
+    auto outcome = outcome_of(replies);
+    if (!outcome) applied_.note(this->parts(), replies);
+    return outcome.map([] { return Task::Next::kDone; });
   }
+
+ private:
+  AppliedValues applied_;
 };
 
 /// Asks one owner for data of one kind.

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
@@ -12,6 +13,7 @@
 #include "partition/routing.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
 #include "support/rig.hpp"
 
 namespace tfdude {
@@ -118,6 +120,44 @@ TEST_CASE("requests: a change that is acknowledged but does not arrive is not de
   CHECK(outcome(rig.requests.find(Deadline(10ms), [](const Directory&) -> Result<int> {
           return fail(Errc::kUnknownFrame, "no frame 'finger'");
         })) == "timeout");
+}
+
+TEST_CASE("requests: owners that have applied their share are not asked for it again") {
+  LoopbackNetwork network;
+  std::optional<std::uint32_t> denied;
+  const auto denies_first = [&](Transport& transport, const PeerId& from, const Request& request) {
+    if (denied.value_or(request.sequence) != request.sequence) return false;
+    denied = request.sequence;
+    transport.reply(from, {request.sequence, 0, Error{Errc::kNotOwner, "not mine"}});
+    return true;
+  };
+  std::set<std::uint32_t> applied;
+  ScriptedOwner arm(network, "arm",
+                    {{"arm", "", {}},
+                     {"wrist", "arm", {}},
+                     testing::moved_by("hand", "arm", testing::revolute_named("a"))},
+                    [&](Transport&, const PeerId&, const Request& request) {
+                      applied.insert(request.sequence);
+                      return false;
+                    });
+  ScriptedOwner leg(network, "leg",
+                    {{"leg", "arm", {}},
+                     {"ankle", "leg", {}},
+                     testing::moved_by("foot", "leg", testing::revolute_named("b"))},
+                    denies_first);
+  Rig rig(network.join());
+  REQUIRE(rig.discovery.await(Deadline(10s)));
+  const Time stamp = Time(1s);
+  const bool of_joints = GENERATE(false, true);
+  const auto changed = rig.requests.change(
+      Deadline(30s), {}, [&](const Directory& directory) -> Result<std::vector<Part>> {
+        if (of_joints) return route_joints(directory, {{{"a", 1, 0}, {"b", 1, 0}}, stamp});
+        const std::vector<EdgeUpdate> edges{{"wrist", {}}, {"ankle", {}}};
+        return route_update(rig.structure.forest, directory, edges, stamp);
+      });
+  CHECK(outcome(changed) == "ok");
+  CHECK(denied);
+  CHECK(applied.size() == 1);
 }
 
 TEST_CASE("requests: a process that lost its partition sends no requests") {
