@@ -22,8 +22,8 @@ void await_frame(Participant& participant, const std::string& id, const Deadline
   if (deadline.over()) return;
   (void)participant.lookups().wait(id, id, {}, deadline.left());
   const auto info = participant.queries().info(id, deadline);
-  const auto path =
-      info ? participant.queries().path(info->parent, id) : Result<std::vector<PathSegment>>();
+  const auto path = info ? participant.queries().path(info->parent, id, deadline)
+                         : Result<std::vector<PathSegment>>();
   if (!path || path->empty()) return;
   participant.discovery().wait_for_partition(path->front().partition, deadline);
 }

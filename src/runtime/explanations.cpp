@@ -79,26 +79,29 @@ void blame(const PartitionInfo& absent, Cause& cause) {
 }  // namespace
 
 Explanation Explanations::why(const std::string& a, const std::string& b, const WhyQuery& query) {
-  const Deadline deadline = discovery_.complete() ? Deadline(std::min(kPatienceForAnswer, timeout_))
-                                                  : discovery_.call_deadline();
+  const Deadline deadline = discovery_.call_deadline();
+  const Milliseconds left = deadline.left();
+  // The rest is for what explains the answer.
+  const Deadline first = deadline.within(
+      discovery_.complete() ? std::min(kPatienceForAnswer, left / 2) : left / 4 * 3);
   Query lookup;
   lookup.at = query.at;
   Explanation explanation;
-  auto found = lookups_.lookup<std::string_view>(a, b, lookup, deadline);
+  auto found = lookups_.lookup<std::string_view>(a, b, lookup, first);
   if (!found) {
-    explanation.cause = cause_of(std::move(found.error()), a, b, query);
+    explanation.cause = cause_of(std::move(found.error()), a, b, query, deadline);
     return explanation;
   }
   explanation.X_AB = *std::move(found);
-  divide(a, b, query, explanation);
+  divide(a, b, query, deadline.within(deadline.left() / 4 * 3), explanation);
   if (const auto edges = structure_.forest.edges(a, b)) {
-    add_ages(owners_of(*edges), explanation);
+    add_ages(owners_of(*edges, deadline), deadline, explanation);
   }
   return explanation;
 }
 
 void Explanations::divide(const std::string& a, const std::string& b, const WhyQuery& query,
-                          Explanation& explanation) {
+                          const Deadline& deadline, Explanation& explanation) {
   const StampedTransform& X_AB = *explanation.X_AB;
   const PathFunctional functional = worst_direction(X_AB);
   explanation.direction = functional.direction;
@@ -106,7 +109,7 @@ void Explanations::divide(const std::string& a, const std::string& b, const WhyQ
   const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
   explanation.variance = functional.gradient.dot(sigma * functional.gradient);
   PathEdgesTask task(structure_.forest, a, b, X_AB.stamp);
-  if (!requests_.run(task, discovery_.call_deadline())) return;
+  if (!requests_.run(task, deadline)) return;
   Eigen::Matrix<double, 6, 1> sensor;
   for (Eigen::Index i = 0; i < 6; ++i) {
     const double stddev = query.sensor[static_cast<std::size_t>(i)];
@@ -121,7 +124,7 @@ void Explanations::divide(const std::string& a, const std::string& b, const WhyQ
     const std::string owner = owner_name(task.info(k).owner);
     if (std::find(asked.begin(), asked.end(), owner) != asked.end()) continue;
     asked.push_back(owner);
-    const auto joints = joints_.list(owner);
+    const auto joints = joints_.list(owner, deadline);
     if (!joints) continue;
     for (const JointInfo& joint : *joints) {
       joint_of[joint.frame] = joint.name;
@@ -156,7 +159,8 @@ std::string Explanations::owner_name(Owner owner) {
   return structure_.directory.name(owner);
 }
 
-Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges) {
+Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges,
+                                             const Deadline& deadline) {
   Owners owners;
   std::vector<Part> parts;
   for (const FrameInfo& edge : edges) {
@@ -166,8 +170,7 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     }
     parts.push_back({edge.owner, name, Request{0, edge.id, HistoryRequest{}}});
   }
-  const std::vector<Reply> replies =
-      requests_.ask(parts, Deadline(std::min(kPatienceForAnswer, timeout_)));
+  const std::vector<Reply> replies = requests_.ask(parts, deadline.within(kPatienceForAnswer));
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const auto* error = std::get_if<Error>(&replies[i].body);
     if (error != nullptr && error->code == Errc::kTimeout && owners.silent.empty()) {
@@ -183,7 +186,8 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
   return owners;
 }
 
-void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
+void Explanations::add_ages(const Owners& owners, const Deadline& deadline,
+                            Explanation& explanation) {
   const auto now = structure_.clock.now();
   for (const std::string& name : owners.order) {
     OwnerAge age{name};
@@ -195,7 +199,7 @@ void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
       age.newest = edge.newest;
     }
     if (age.newest && now) age.age = *now - *age.newest;
-    if (age.age) age.clock_ahead = clock_ahead(name);
+    if (age.age) age.clock_ahead = clock_ahead(name, deadline);
     explanation.owners.push_back(std::move(age));
   }
 }
@@ -203,7 +207,7 @@ void Explanations::add_ages(const Owners& owners, Explanation& explanation) {
 // ---- why there is no answer
 
 Cause Explanations::cause_of(Error error, const std::string& a, const std::string& b,
-                             const WhyQuery& query) {
+                             const WhyQuery& query, const Deadline& deadline) {
   Cause cause;
   cause.error = std::move(error);
   if (explain_missed(a, b, cause)) return cause;
@@ -221,7 +225,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
   }
   explain_absent(*edges, cause);
   if (cause.obstacle != Obstacle::kOther) return cause;
-  Owners owners = owners_of(*edges);
+  Owners owners = owners_of(*edges, deadline);
   if (!owners.silent.empty()) {
     cause.obstacle = Obstacle::kOwnerSilent;
     cause.partition = owners.silent;
@@ -236,7 +240,7 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
     return cause;
   }
   const bool of_time = cause.error.code == Errc::kNotYet || cause.error.code == Errc::kTooOld;
-  if (of_time) explain_time(std::move(owners), query, cause);
+  if (of_time) explain_time(std::move(owners), query, deadline, cause);
   return cause;
 }
 
@@ -331,7 +335,8 @@ bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {
   return false;
 }
 
-void Explanations::explain_time(Owners owners, const WhyQuery& query, Cause& cause) {
+void Explanations::explain_time(Owners owners, const WhyQuery& query, const Deadline& deadline,
+                                Cause& cause) {
   // Of edges with one stamp, as a controller sends them, the message names one: it is the first.
   std::stable_partition(owners.dynamic.begin(), owners.dynamic.end(),
                         [&](const EdgeHistory& one) { return one.id == cause.error.frame; });
@@ -378,16 +383,17 @@ void Explanations::explain_time(Owners owners, const WhyQuery& query, Cause& cau
               " of partition " + quote(last_to_begin->partition) + " begins");
   }
   if (cause.partition.empty()) return;
-  cause.clock_ahead = clock_ahead(cause.partition);
+  cause.clock_ahead = clock_ahead(cause.partition, deadline);
   if (cause.clock_ahead) cause.needs += "; " + clock_hint(cause.partition, *cause.clock_ahead);
 }
 
-std::optional<std::chrono::nanoseconds> Explanations::clock_ahead(const std::string& partition) {
+std::optional<std::chrono::nanoseconds> Explanations::clock_ahead(const std::string& partition,
+                                                                  const Deadline& deadline) {
   // Of the system's clocks.
   if (structure_.clock.kind() != ClockKind::kSystem) return std::nullopt;
   // Two, as the first one may be slow.
   const auto difference =
-      queries_.clock_difference(partition, Deadline(std::min(kPatienceForAnswer, timeout_)), 2);
+      queries_.clock_difference(partition, deadline.within(kPatienceForAnswer), 2);
   const bool differs = difference && difference->exceeds(kClockDiffers);
   return differs ? std::optional(difference->ahead) : std::nullopt;
 }

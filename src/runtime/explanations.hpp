@@ -21,7 +21,6 @@ class Explanations {
       : structure_(context.structure),
         discovery_(context.discovery),
         requests_(context.requests),
-        timeout_(context.options.timeout),
         lookups_(lookups),
         queries_(queries),
         joints_(joints) {}
@@ -44,21 +43,22 @@ class Explanations {
   };
 
   void divide(const std::string& a, const std::string& b, const WhyQuery& query,
-              Explanation& explanation);
-  [[nodiscard]] Owners owners_of(const std::vector<FrameInfo>& edges);
-  void add_ages(const Owners& owners, Explanation& explanation);
+              const Deadline& deadline, Explanation& explanation);
+  [[nodiscard]] Owners owners_of(const std::vector<FrameInfo>& edges, const Deadline& deadline);
+  void add_ages(const Owners& owners, const Deadline& deadline, Explanation& explanation);
 
   [[nodiscard]] Cause cause_of(Error error, const std::string& a, const std::string& b,
-                               const WhyQuery& query);
+                               const WhyQuery& query, const Deadline& deadline);
   void explain_unknown(const std::string& id, Cause& cause);
   void explain_apart(const std::string& a, const std::string& b, Cause& cause);
   /// By an owner that others miss, and of which nothing else is known here.
   [[nodiscard]] bool explain_missed(const std::string& a, const std::string& b, Cause& cause);
   [[nodiscard]] std::optional<FrameInfo> top_of(const std::string& id) const;
   void explain_absent(const std::vector<FrameInfo>& edges, Cause& cause);
-  void explain_time(Owners owners, const WhyQuery& query, Cause& cause);
+  void explain_time(Owners owners, const WhyQuery& query, const Deadline& deadline, Cause& cause);
   /// Absent: it does not differ, or that is not known.
-  [[nodiscard]] std::optional<std::chrono::nanoseconds> clock_ahead(const std::string& partition);
+  [[nodiscard]] std::optional<std::chrono::nanoseconds> clock_ahead(const std::string& partition,
+                                                                    const Deadline& deadline);
   [[nodiscard]] bool has_other_clock(const Owners& owners, Cause& cause);
   [[nodiscard]] std::string owner_name(Owner owner);
   [[nodiscard]] std::vector<std::string> names_like(const std::string& id);
@@ -66,7 +66,6 @@ class Explanations {
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
-  const Milliseconds timeout_;
   Lookups& lookups_;
   Queries& queries_;
   JointCalls& joints_;

@@ -68,8 +68,8 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   return outcome ? sent : outcome;
 }
 
-Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition) {
-  const Deadline deadline = discovery_.call_deadline();
+Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition,
+                                                const Deadline& deadline) {
   std::vector<JointInfo> all;
   while (true) {
     const std::string last = all.empty() ? std::string() : all.back().name;

@@ -24,7 +24,11 @@ class JointCalls {
 
   [[nodiscard]] Result<void> update(const JointUpdate& update);
   [[nodiscard]] Result<void> publish(const JointUpdate& update);
-  [[nodiscard]] Result<std::vector<JointInfo>> list(const std::string& partition);
+  [[nodiscard]] Result<std::vector<JointInfo>> list(const std::string& partition) {
+    return list(partition, discovery_.call_deadline());
+  }
+  [[nodiscard]] Result<std::vector<JointInfo>> list(const std::string& partition,
+                                                    const Deadline& deadline);
 
   /// Applies published positions. Rejected ones are counted and logged.
   void on_joints(const JointUpdate& update);

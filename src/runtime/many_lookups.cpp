@@ -17,6 +17,10 @@ namespace {
 constexpr Milliseconds kShortestPause{1};
 constexpr Milliseconds kLongestPause{50};
 
+auto answers(const std::vector<ManyLookups::Found>& all) {
+  return std::count_if(all.begin(), all.end(), [](const auto& one) { return one.has_value(); });
+}
+
 bool is_of_time(Errc code) { return code == Errc::kNotYet || code == Errc::kTooOld; }
 
 }  // namespace
@@ -25,10 +29,14 @@ std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<Frame
                                                          const Query& query,
                                                          const Deadline& deadline) {
   LookupManyTask task(structure_.forest, structure_.clock.kind(), hints_, pairs, query);
-  auto asked = requests_.run(task, deadline);
+  // Frames that are not discovered by then leave some time to ask for the others.
+  const Deadline first =
+      discovery_.complete() ? deadline : deadline.within(deadline.left() / 4 * 3);
+  auto asked = requests_.run(task, first);
   // Those that do not exist are known by now: the others are asked for without them.
-  if (!asked && task.settle(asked.error())) {
-    asked = requests_.run(task, deadline.over() ? Deadline(timeout_) : deadline);
+  const bool in_time = first.at() < deadline.at();
+  if (!asked && (task.settle(asked.error()) || (in_time && asked.error().code == Errc::kTimeout))) {
+    asked = requests_.run(task, deadline);
   }
   if (!asked) task.fail_all(asked.error());
   return std::move(task.found());
@@ -36,17 +44,21 @@ std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<Frame
 
 std::vector<ManyLookups::Found> ManyLookups::lookup(const std::vector<FramePair>& pairs,
                                                     const Query& query, Milliseconds wait) {
+  if (wait <= Milliseconds(0)) return lookup_once(pairs, query, discovery_.call_deadline());
   const Deadline until(wait);
+  std::vector<Found> before;
   for (auto pause = kShortestPause;; pause = std::min(2 * pause, kLongestPause)) {
-    auto found = lookup_once(pairs, query, discovery_.call_deadline());
-    if (wait <= Milliseconds(0) || until.over()) return found;
+    auto found = lookup_once(pairs, query, until.within(timeout_));
+    // A round that the end of the wait has cut short says less than the one before.
+    if (until.over()) return answers(found) > answers(before) || before.empty() ? found : before;
     std::size_t i = 0;
     while (i < found.size() && (found[i] || !is_worth_waiting(found[i].error(), query))) ++i;
     if (i == found.size()) return found;
     // Alone it may have an answer at once, but not at the instant of the others.
     const auto next = std::min(Deadline(pause).at(), until.at());
     (void)lookups_.wait(pairs[i].a, pairs[i].b, query, until.left());
-    if (!lookups_.pause(next)) return found;
+    if (!lookups_.pause(next) || until.over()) return found;
+    before = std::move(found);
   }
 }
 

@@ -24,7 +24,8 @@ std::vector<std::string> ids_of(const std::vector<Frame>& frames, Condition cond
 
 }  // namespace
 
-Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b) {
+Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_view b,
+                                               const Deadline& deadline) {
   const auto route = [&](const Directory& directory) -> Result<std::vector<PathSegment>> {
     auto segments = structure_.forest.segments(a, b);
     if (!segments) return tl::unexpected(std::move(segments.error()));
@@ -36,8 +37,7 @@ Result<std::vector<PathSegment>> Queries::path(std::string_view a, std::string_v
     }
     return path;
   };
-  return requests_.find(discovery_.call_deadline(), {std::string(a), std::string(b)}, Task::kFresh,
-                        route);
+  return requests_.find(deadline, {std::string(a), std::string(b)}, Task::kFresh, route);
 }
 
 Result<Handle> Queries::find(std::string_view id) {
@@ -59,7 +59,7 @@ Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline)
   if (info || info.error().code != Errc::kUnknownFrame || requests_.on_demand() != nullptr) {
     return info;
   }
-  for (KnownFrame& frame : frames_before({{id}})) {
+  for (KnownFrame& frame : frames_before({{id}}, deadline)) {
     if (frame.id != id) continue;
     const Lock lock(structure_.mutex);
     const auto owner = structure_.directory.owner(frame.partition);
@@ -69,8 +69,8 @@ Result<FrameInfo> Queries::info(const std::string& id, const Deadline& deadline)
 }
 
 // Each is listed after its parent.
-Result<std::vector<Frame>> Queries::followed() {
-  auto known = requests_.on_demand()->followed(discovery_.call_deadline());
+Result<std::vector<Frame>> Queries::followed(const Deadline& deadline) {
+  auto known = requests_.on_demand()->followed(deadline);
   if (!known) return tl::unexpected(std::move(known.error()));
   std::set<std::string> there;
   std::vector<Frame> frames;
@@ -90,9 +90,9 @@ bool Queries::knows_all() {
   return !structure_.directory.only_heard_of();
 }
 
-std::vector<KnownFrame> Queries::frames_before(const FramesRequest& wanted) {
+std::vector<KnownFrame> Queries::frames_before(const FramesRequest& wanted,
+                                               const Deadline& deadline) {
   if (knows_all()) return {};
-  const Deadline deadline = discovery_.call_deadline();
   std::vector<Part> owners;
   {
     const Lock lock(structure_.mutex);
@@ -110,10 +110,10 @@ std::vector<KnownFrame> Queries::frames_before(const FramesRequest& wanted) {
   return all;
 }
 
-Result<std::vector<Frame>> Queries::frames() {
-  if (requests_.on_demand() != nullptr) return followed();
-  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
-  std::vector<KnownFrame> before = frames_before({{}, {std::string(1, kAnyName)}});
+Result<std::vector<Frame>> Queries::frames(const Deadline& deadline) {
+  if (requests_.on_demand() != nullptr) return followed(deadline);
+  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
+  std::vector<KnownFrame> before = frames_before({{}, {std::string(1, kAnyName)}}, deadline);
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
   frames.reserve(infos.size());
@@ -143,9 +143,10 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
   if (auto ok = requests_.check_keeps_all("list children of frame " + quote(id)); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  const Deadline deadline = discovery_.call_deadline();
+  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
   if (!knows_all()) {
-    auto all = frames();
+    auto all = frames(deadline);
     if (!all) return tl::unexpected(std::move(all.error()));
     const auto is_it = [&](const Frame& frame) { return frame.id == id; };
     if (std::any_of(all->begin(), all->end(), is_it)) {
@@ -159,15 +160,18 @@ Result<std::vector<std::string>> Queries::roots() {
   if (auto ok = requests_.check_keeps_all("list roots"); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  if (auto all = all_known(); !all) return tl::unexpected(std::move(all.error()));
+  const Deadline deadline = discovery_.call_deadline();
+  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
   if (knows_all()) return structure_.forest.roots();
-  auto all = frames();
+  auto all = frames(deadline);
   if (!all) return tl::unexpected(std::move(all.error()));
   return ids_of(*all, [](const Frame& frame) { return !frame.attached; });
 }
 
 Result<std::vector<PartitionInfo>> Queries::partitions() {
-  if (auto known = all_known(); !known) return tl::unexpected(std::move(known.error()));
+  if (auto known = discovery_.await(discovery_.call_deadline()); !known) {
+    return tl::unexpected(std::move(known.error()));
+  }
   auto partitions = member_.with_rules([](const Member& member) { return member.partitions(); });
   for (IncompatiblePeer& peer : transport_.incompatible()) {
     PartitionInfo info;

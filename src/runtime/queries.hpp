@@ -26,13 +26,17 @@ class Queries {
         member_(context.member),
         transport_(context.transport) {}
 
-  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b);
+  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b,
+                                                      const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<PathSegment>> path(std::string_view a, std::string_view b) {
+    return path(a, b, discovery_.call_deadline());
+  }
   [[nodiscard]] Result<Handle> find(std::string_view id);
   [[nodiscard]] Result<FrameInfo> info(const std::string& id, const Deadline& deadline);
   [[nodiscard]] Result<FrameInfo> info(const std::string& id) {
     return info(id, discovery_.call_deadline());
   }
-  [[nodiscard]] Result<std::vector<Frame>> frames();
+  [[nodiscard]] Result<std::vector<Frame>> frames() { return frames(discovery_.call_deadline()); }
   [[nodiscard]] Result<std::vector<std::string>> children(std::string_view id);
   [[nodiscard]] Result<std::vector<std::string>> roots();
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
@@ -44,13 +48,14 @@ class Queries {
                                                          const Deadline& deadline, int round_trips);
 
  private:
-  [[nodiscard]] Result<std::vector<Frame>> followed();
+  [[nodiscard]] Result<std::vector<Frame>> frames(const Deadline& deadline);
+  [[nodiscard]] Result<std::vector<Frame>> followed(const Deadline& deadline);
   /// Whether no partition was lost before this process started.
   [[nodiscard]] bool knows_all();
   /// Of the wanted frames those that owners know, if a partition was lost before this process
   /// started.
-  [[nodiscard]] std::vector<KnownFrame> frames_before(const FramesRequest& wanted);
-  [[nodiscard]] Result<void> all_known() { return discovery_.await(discovery_.call_deadline()); }
+  [[nodiscard]] std::vector<KnownFrame> frames_before(const FramesRequest& wanted,
+                                                      const Deadline& deadline);
 
   Structure& structure_;
   Discovery& discovery_;

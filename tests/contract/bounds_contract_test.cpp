@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/networks.hpp"
+#include "support/relay.hpp"
 
 namespace tfdude {
 namespace {
@@ -39,7 +41,49 @@ struct FirstLookup {
   std::string message;
 };
 
+/// All participants are discovered late, and owners do not say which frames they know.
+class Late final : public testing::Relay {
+ public:
+  static constexpr Milliseconds kDiscovery{70};
+  using Relay::Relay;
+  using Relay::send;
+
+  bool discovered() const override { return Clock::now() - begin_ >= kDiscovery; }
+  Result<void> send(const std::string& partition, const Request& request,
+                    Deadline deadline) override {
+    const bool lost = std::holds_alternative<FramesRequest>(request.body);
+    return lost ? Result<void>() : Relay::send(partition, request, deadline);
+  }
+
+ private:
+  const Clock::time_point begin_ = Clock::now();
+};
+
 }  // namespace
+
+TEST_CASE("bounds: a call of several steps has one deadline for all") {
+  const Join join = testing::join_loopback();
+  const auto base = Node::open(join("base"), "base", {{"world", "", {}}}).value();
+  // A partition that was lost before, so the others are asked for its frames.
+  { const auto arm = Node::open(join("arm"), "arm", {{"arm", "world", {}}}).value(); }
+  ClientOptions options;
+  options.timeout = Milliseconds(100);
+  options.discovery = Milliseconds(0);
+  const int call = GENERATE(0, 1, 2, 3);
+  auto took = Clock::duration::max();
+  for (int i = 0; i < 10 && took >= 130ms; ++i) {
+    auto client = Client::open(std::make_unique<Late>(join("")), options).value();
+    const auto start = Clock::now();
+    if (call == 0) (void)client.frames();
+    if (call == 1) (void)client.children("world");
+    if (call == 2) (void)client.roots();
+    if (call == 3) (void)client.whether_exists("nobody");
+    took = std::min(took, Clock::now() - start);
+    CHECK(Clock::now() - start >= Late::kDiscovery);
+  }
+  INFO("call " << call);
+  CHECK(took < 130ms);
+}
 
 TEST_CASE("bounds: alone in the domain a lookup ends at its maximum wait") {
   const int transport = GENERATE(from_range(testing::networks()));

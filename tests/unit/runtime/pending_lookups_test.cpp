@@ -252,7 +252,19 @@ TEST_CASE("lookups: every call without a wait times out and never reports unknow
   CHECK(early([](Client& c) { return c.history("nobody"); }) == "timeout");
   CHECK(early([](Client& c) { return c.histories("nowhere"); }) == "timeout");
   CHECK(early([&](Client& c) { return c.update_partial(raised); }) == "timeout");
+  // One pair is not known to exist, and the owner of the other does not answer.
+  CHECK(early([](Client& c) {
+          return c.lookup_many("world", {"nobody", "hand"})[1];
+        }) == "timeout");
   const auto deaf = [&](auto call) { return of_new_client(true, call); };
+  CHECK(deaf([](Client& c) { return c.lookup_many("world", {"nobody", "hand"})[1]; }) == "timeout");
+  CHECK(deaf([](Client& c) { return c.lookup_many("world", {"hand"}, {}, 50ms)[0]; }) == "timeout");
+  CHECK(deaf([](Client& c) {
+          const Explanation why = c.why("world", "hand", {});
+          REQUIRE(why.cause);
+          CHECK(why.cause->obstacle == Obstacle::kOwnerSilent);
+          return Result<void>(tl::unexpected(why.cause->error));
+        }) == "timeout");
   CHECK(deaf([](Client& c) { return c.lookup("world", "hand"); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.update("hand", {}); }) == "timeout");
   CHECK(deaf([](Client& c) { return c.move("hand", "base"); }) == "timeout");
