@@ -126,13 +126,18 @@ bool WatchedPartition::on_denied(const Part& /*part*/, const Error* why) {
 
 // ---- news
 
-void WatchedPartition::post(PartitionNews news, std::size_t values) {
+void WatchedPartition::post(PartitionNews news, std::size_t count) {
   if (!*listener_) return;
-  *waiting_ += values;
-  line_->post([listener = listener_, waiting = waiting_, values, news = std::move(news)] {
-    *waiting -= values;
+  *waiting_ += count;
+  line_->post([listener = listener_, waiting = waiting_, count, news = std::move(news)] {
+    *waiting -= count;
     (*listener)(news);
   });
+}
+
+void WatchedPartition::post_frames() {
+  frames_due_ = is_too_much(frames_.size());
+  if (!frames_due_) post({name_, FramesNews{frames_, incarnation_}}, frames_.size());
 }
 
 bool WatchedPartition::take_over() {
@@ -144,7 +149,10 @@ bool WatchedPartition::take_over() {
   };
   const bool begins = planned_.incarnation != incarnation_;
   const bool same_groups = std::all_of(planned_.groups.begin(), planned_.groups.end(), is_known);
-  if (!begins && same_groups && planned_.frames == frames_) return false;
+  if (!begins && same_groups && planned_.frames == frames_) {
+    if (frames_due_) post_frames();
+    return false;
+  }
   if (begins) groups_.clear();
   const bool new_frames = begins || planned_.frames != frames_;
   carry_over();
@@ -153,7 +161,7 @@ bool WatchedPartition::take_over() {
   skipped_from_.reset();
   missing_from_.reset();
   misses_recent();
-  if (new_frames) post({name_, FramesNews{frames_, incarnation_}});
+  if (new_frames || frames_due_) post_frames();
   return true;
 }
 
@@ -303,7 +311,8 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (group == groups_.end()) return false;
   auto whole = group->received.whole(pushed);
   if (!whole) return false;
-  if (*waiting_ + whole->entries.size() > kMostWaiting && *waiting_ > 0) {
+  if (frames_due_) post_frames();
+  if (frames_due_ || is_too_much(whole->entries.size())) {
     group->received.skip(*whole);
     misses_recent();
     return true;
@@ -341,7 +350,7 @@ bool WatchedPartition::settles(Clock::time_point now) const {
 
 bool WatchedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
-  return lacks_any() || skipped_from_ || settles(now);
+  return lacks_any() || skipped_from_ || frames_due_ || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.

@@ -29,7 +29,7 @@ class WatchedPartition final : public Watched {
  public:
   using Listener = std::function<void(const PartitionNews&)>;
 
-  /// How many values may wait for the listener.
+  /// How many values and frames may wait for the listener.
   static constexpr std::size_t kMostWaiting = 100'000;
   /// How long the groups of the plan before stay once the new ones have answered: DDS may match
   /// their readers later.
@@ -129,7 +129,14 @@ class WatchedPartition final : public Watched {
   /// Keeps what is known of edges that stay in the plan, and the groups of before.
   void carry_over() TFDUDE_REQUIRES(mutex_);
   void became_unreachable(std::string why);
-  void post(PartitionNews news, std::size_t values = 0);
+  /// Whether so many values or frames more are too many for the listener.
+  [[nodiscard]] bool is_too_much(std::size_t more) const {
+    return *waiting_ > 0 && *waiting_ + more > kMostWaiting;
+  }
+  /// Posts the newest list of frames, or leaves it due if that is too much.
+  void post_frames() TFDUDE_REQUIRES(mutex_);
+  /// @param count  of values or frames
+  void post(PartitionNews news, std::size_t count = 0);
 
   const std::string name_;
   const std::chrono::nanoseconds period_;
@@ -142,6 +149,7 @@ class WatchedPartition final : public Watched {
   Planned planned_;               // until it is adopted
   mutable Mutex mutex_{LockRank::kWatchedPath};
   bool reachable_ TFDUDE_GUARDED_BY(mutex_) = false;
+  bool frames_due_ TFDUDE_GUARDED_BY(mutex_) = false;  // not yet posted; no values are until then
   std::uint64_t incarnation_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::vector<WatchedFrame> frames_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<Known> known_ TFDUDE_GUARDED_BY(mutex_);  // by frame

@@ -1,8 +1,11 @@
 #include "runtime/watched_partition.hpp"
 
 #include <chrono>
+#include <functional>
+#include <future>
 #include <map>
 #include <mutex>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -60,6 +63,7 @@ struct WatchedOwner {
   Forest forest;
   Directory directory{forest, "arm"};
   Watched::Clock::time_point now{1h};
+  std::function<void(const PartitionNews&)> heard;
   std::mutex mutex;
   std::vector<long> stamps;
   std::map<std::pair<std::uint32_t, long>, double> values_at;  // by frame and stamp [ms]
@@ -68,6 +72,7 @@ struct WatchedOwner {
   WatchedPartition watch{
       "arm", 0,
       [this](const PartitionNews& news) {
+        if (heard) heard(news);
         const auto* values = std::get_if<ValuesNews>(&news.what);
         if (values == nullptr) return;
         const std::lock_guard lock(mutex);
@@ -169,6 +174,47 @@ TEST_CASE("watched partition: what an answer shows to be lost is asked for") {
   CHECK_FALSE(owner.watch.lacks(owner.now));
   CHECK(eventually([&] { return owner.told().size() >= 4; }));
   CHECK(owner.told() == std::vector<long>{1000, 1005, 1020, 1010});
+}
+
+TEST_CASE("watched partition: lists of frames that wait for a slow listener are bounded") {
+  constexpr int kFrames = 500;
+  constexpr int kChanges = 400;
+  static_assert(kFrames * kChanges > 3 * WatchedPartition::kMostWaiting / 2);
+  WatchedOwner owner;
+  std::promise<void> go;
+  const auto held = go.get_future().share();
+  int lists = 0;
+  std::size_t newest = 0;
+  owner.heard = [&](const PartitionNews& news) {
+    held.wait();
+    const auto* frames = std::get_if<FramesNews>(&news.what);
+    if (frames == nullptr) return;
+    const std::lock_guard lock(owner.mutex);
+    ++lists;
+    newest = frames->frames.size();
+  };
+  for (int i = 0; i < kFrames; ++i) {
+    REQUIRE(owner.forest.add("f" + std::to_string(i), "base", along_x(1)));
+  }
+  for (int i = 0; i < kChanges; ++i) {
+    REQUIRE(owner.forest.move("f0", i % 2 == 0 ? "arm" : "base", along_x(1)));
+    WatchedGroup group = owner.plan();
+    owner.answer(group);
+  }
+  REQUIRE(owner.forest.add("last", "base", along_x(1)));
+  go.set_value();
+  // The newest list comes, and then the values; the samples of the arm among them.
+  std::size_t left = 0;
+  CHECK(eventually([&] {
+    WatchedGroup group = owner.plan();
+    owner.answer(group);
+    const std::lock_guard lock(owner.mutex);
+    left = newest;
+    return newest == kFrames + 3 && !owner.stamps.empty();
+  }));
+  CHECK(left == kFrames + 3);
+  const std::lock_guard lock(owner.mutex);
+  CHECK(static_cast<std::size_t>(lists) <= WatchedPartition::kMostWaiting / kFrames + 2);
 }
 
 // An owner of two edges; the first pushes of the watch were taken.
