@@ -101,6 +101,10 @@ Watched::Plan WatchedPartition::adopt(Clock::time_point /*now*/) {
 }
 
 bool WatchedPartition::on_no_plan(Error why, Clock::time_point /*now*/) {
+  {
+    const Lock lock(mutex_);
+    denied_ = false;  // it may return as another process
+  }
   became_unreachable(std::move(why.message));
   return true;
 }
@@ -110,8 +114,20 @@ void WatchedPartition::became_unreachable(std::string why) {
   if (std::exchange(reachable_, false)) post({name_, ReachNews{false, std::move(why)}});
 }
 
+void WatchedPartition::deny(std::string why) {
+  {
+    const Lock lock(mutex_);
+    denied_ = true;
+  }
+  became_unreachable(std::move(why));
+}
+
+void WatchedPartition::became_reachable() {
+  if (!std::exchange(reachable_, true)) post({name_, ReachNews{true, {}}});
+}
+
 bool WatchedPartition::on_deaf(Error why) {
-  became_unreachable(std::move(why.message));
+  deny(std::move(why.message));
   return true;
 }
 
@@ -120,7 +136,7 @@ bool WatchedPartition::on_denied(const Part& /*part*/, const Error* why) {
   // More edges are correlated with others than an answer can have.
   if (why->code == Errc::kInvalidInput && most_ > kMaxCorrelated) most_ = kMaxCorrelated;
   const bool lasts = why->code == Errc::kNotPermitted || why->code == Errc::kTooMuch;
-  if (lasts) became_unreachable(why->message);
+  if (lasts) deny(why->message);
   return lasts;
 }
 
@@ -142,7 +158,7 @@ void WatchedPartition::post_frames() {
 
 bool WatchedPartition::take_over() {
   const Lock lock(mutex_);
-  if (!std::exchange(reachable_, true)) post({name_, ReachNews{true, {}}});
+  if (!denied_) became_reachable();
   const auto is_known = [&](const PlannedGroup& group) TFDUDE_REQUIRES(mutex_) {
     return std::any_of(groups_.begin(), groups_.end(),
                        [&](const Group& one) { return one.id == group.id && !one.outdated; });
@@ -311,6 +327,7 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (group == groups_.end()) return false;
   auto whole = group->received.whole(pushed);
   if (!whole) return false;
+  if (is_answer(*whole) && std::exchange(denied_, false)) became_reachable();
   if (frames_due_) post_frames();
   if (frames_due_ || is_too_much(whole->entries.size())) {
     group->received.skip(*whole);

@@ -129,6 +129,9 @@ class WatchedPartition final : public Watched {
   /// Keeps what is known of edges that stay in the plan, and the groups of before.
   void carry_over() TFDUDE_REQUIRES(mutex_);
   void became_unreachable(std::string why);
+  /// The watch is denied, or cannot be heard: until an answer comes it does not count as reachable.
+  void deny(std::string why);
+  void became_reachable() TFDUDE_REQUIRES(mutex_);
   /// Whether so many values or frames more are too many for the listener.
   [[nodiscard]] bool is_too_much(std::size_t more) const {
     return *waiting_ > 0 && *waiting_ + more > kMostWaiting;
@@ -149,6 +152,7 @@ class WatchedPartition final : public Watched {
   Planned planned_;               // until it is adopted
   mutable Mutex mutex_{LockRank::kWatchedPath};
   bool reachable_ TFDUDE_GUARDED_BY(mutex_) = false;
+  bool denied_ TFDUDE_GUARDED_BY(mutex_) = false;      // until an answer comes
   bool frames_due_ TFDUDE_GUARDED_BY(mutex_) = false;  // not yet posted; no values are until then
   std::uint64_t incarnation_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::vector<WatchedFrame> frames_ TFDUDE_GUARDED_BY(mutex_);

@@ -62,7 +62,8 @@ struct ValuesNews {
   std::vector<WatchedValue> values;
 };
 
-/// The owner is reachable, or not. Its last values hold on while it is not.
+/// The owner is reachable, or not. Its last values hold on while it is not. One that denies the
+/// watch is not, until it answers.
 struct ReachNews {
   bool reachable = false;
   std::string why;  ///< if it is not

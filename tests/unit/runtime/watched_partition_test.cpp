@@ -217,6 +217,33 @@ TEST_CASE("watched partition: lists of frames that wait for a slow listener are 
   CHECK(static_cast<std::size_t>(lists) <= WatchedPartition::kMostWaiting / kFrames + 2);
 }
 
+TEST_CASE("watched partition: an owner that denies the watch is not called reachable in between") {
+  WatchedOwner owner;
+  std::vector<bool> reached;
+  owner.heard = [&](const PartitionNews& news) {
+    const std::lock_guard lock(owner.mutex);
+    if (const auto* reach = std::get_if<ReachNews>(&news.what)) reached.push_back(reach->reachable);
+  };
+  const auto hears = [&](std::size_t count) {
+    return eventually([&] {
+      const std::lock_guard lock(owner.mutex);
+      return reached.size() >= count;
+    });
+  };
+  const bool is_deaf = GENERATE(false, true);
+  for (int i = 0; i < 3; ++i) {
+    (void)owner.plan();
+    const Error why{Errc::kNotPermitted, "not for you"};
+    CHECK((is_deaf ? owner.watch.on_deaf(why) : owner.watch.on_denied({}, &why)));
+  }
+  REQUIRE(hears(2));
+  WatchedGroup group = owner.plan();
+  owner.answer(group);
+  REQUIRE(hears(3));
+  const std::lock_guard lock(owner.mutex);
+  CHECK(reached == std::vector<bool>{true, false, true});
+}
+
 // An owner of two edges; the first pushes of the watch were taken.
 struct SettledOwner : WatchedOwner {
   SettledOwner() {
