@@ -139,6 +139,9 @@ void WatchClient::wait_for_commits() {
   std::function<void()> listener;
   if (own) listener = [this] { look_job_.ask(); };
   context_.structure.forest.on_commit(std::move(listener), this);
+  // Of what was committed before.
+  if (own && !std::exchange(hears_own_, own)) look_job_.ask();
+  hears_own_ = own;
 }
 
 Result<void> WatchClient::plan(Watched& watched) {

@@ -83,6 +83,7 @@ class WatchClient final : private WatchLink {
   MemoryReads* const memory_;
   std::atomic<bool> watches_paths_{false};  // or has watched one before
   WatchRounds rounds_;
+  bool hears_own_ = false;  // of own commits; belongs to the rounds
   // Last: they use the other members.
   Loop::Job look_job_;  // after own commits
   Loop::Job job_;
