@@ -9,6 +9,17 @@
 #include "partition/requests.hpp"
 
 namespace tfdude {
+namespace {
+
+/// @return kUnreachable
+Result<void> check_still_there(Structure& structure, const std::string& partition) {
+  const Lock lock(structure.mutex);
+  const auto owner = structure.directory.owner(partition);
+  if (!owner || *owner == kHeldHere || structure.directory.reachable(*owner)) return {};
+  return check_reachable(structure.directory, {Part{*owner, partition, {}}});
+}
+
+}  // namespace
 
 Requests::Requests(Structure& structure, Discovery& discovery, Transport& transport,
                    OwnPartition& own, std::optional<Follow> follow)
@@ -45,7 +56,11 @@ Error Requests::last_word(Error error, const TimeLimit& limit) {
 Result<void> Requests::send(const std::string& partition, const Request& request,
                             Clock::time_point until) {
   const auto read = own_.read(request);
-  if (!read) return transport_.send(partition, request, until);
+  if (!read) {
+    // Its loss may have been told after the plan, and before a reply was awaited.
+    if (auto ok = check_still_there(structure_, partition); !ok) return ok;
+    return transport_.send(partition, request, until);
+  }
   replies_.on_reply(partition, *read);
   return {};
 }

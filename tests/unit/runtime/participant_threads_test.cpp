@@ -127,7 +127,7 @@ TEST_CASE("watch: own commits at its beginning are noticed while another owner i
   // The computer may be busy, so only the fastest try counts.
   for (int i = 0; i < 10 && best >= 500ms; ++i) {
     LoopbackNetwork network;
-    // It cannot be read in memory.
+    // Its memory cannot be read, so it is asked.
     const Node mute =
         Node::open(network.join(), "mute", {{"m", "", {}}, {"n", "m", {}}}, pushes).value();
     std::atomic<int> asked{0};

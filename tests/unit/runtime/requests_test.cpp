@@ -14,6 +14,7 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
+#include "support/process.hpp"
 #include "support/rig.hpp"
 
 namespace tfdude {
@@ -167,6 +168,29 @@ TEST_CASE("requests: a process that lost its partition sends no requests") {
   rig.owns_partition = [] { return fail(Errc::kPartitionTaken, "served by another process"); };
   CHECK(outcome(add_finger(rig, Deadline(10s))) == "partition_taken");
   CHECK(arm.asked() == 0);
+}
+
+TEST_CASE("requests: an owner that has left before it was asked is not waited for") {
+  LoopbackNetwork network;
+  ScriptedOwner arm(network, "arm", kArm);
+  Rig rig(network.join());
+  auto part = rig.requests.find(Deadline(10s), [](const Directory& directory) {
+    return route_to_partition(directory, Request{0, "arm", HistoryRequest{true}});
+  });
+  REQUIRE(part);
+  arm.leave();
+  REQUIRE(testing::eventually([&] {
+    const Lock lock(rig.structure.mutex);
+    return !rig.structure.directory.reachable(part->owner);
+  }));
+  // As a second round, or a lookup that waits, may do.
+  std::vector<Part> parts{*part};
+  const auto start = Deadline::Clock::now();
+  const std::vector<Reply> replies = rig.requests.ask(parts, Deadline(20s));
+  CHECK(Deadline::Clock::now() - start < 10s);
+  const auto* error = std::get_if<Error>(&replies.at(0).body);
+  REQUIRE(error != nullptr);
+  CHECK(error->code == Errc::kUnreachable);
 }
 
 TEST_CASE("requests: a list of an owner is returned and so is its error") {
