@@ -83,8 +83,10 @@ Cloud transform_cloud(const Session& session, const std::string& a, const std::s
     if (query.fixed.empty()) {
       (void)wait_for_lookup(session, a, b, last, left);
     } else {
+      const auto end = std::chrono::steady_clock::now() + std::min(left, Milliseconds(1 << 30));
       (void)wait_for_lookup(session, query.fixed, a, last, left);
-      (void)wait_for_lookup(session, query.fixed, b, last, left);
+      const auto rest = std::chrono::ceil<Milliseconds>(end - std::chrono::steady_clock::now());
+      if (rest > Milliseconds(0)) (void)wait_for_lookup(session, query.fixed, b, last, rest);
     }
     return {};
   };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "session.hpp"
@@ -62,6 +63,7 @@ auto call_when_ready(const Session& session, Milliseconds wait, Ready ready, Cal
     -> decltype(session.call(call)) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::min(wait, Milliseconds(1 << 30));
+  auto pause = std::chrono::milliseconds(1);
   for (Milliseconds left = wait;; check_interrupted()) {
     if (left > Milliseconds(0)) {
       auto there = ready(left);
@@ -70,6 +72,10 @@ auto call_when_ready(const Session& session, Milliseconds wait, Ready ready, Cal
     auto result = session.call(call);
     left = std::chrono::ceil<Milliseconds>(end - Clock::now());
     if (result || left <= Milliseconds(0) || !may_return(result.error().code)) return result;
+    // What is waited for may be there all the time.
+    const py::gil_scoped_release released;
+    std::this_thread::sleep_for(std::min(pause, left));
+    pause = std::min(2 * pause, kLook);
   }
 }
 

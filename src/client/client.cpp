@@ -35,7 +35,7 @@ auto after_wait_for(Participant& participant, const std::string& partition, Mill
     participant.discovery().wait_for_partition(partition, Deadline(left));
     return Result<void>();
   };
-  return after_wait(wait, ready, call);
+  return after_wait(participant.lookups(), wait, ready, call);
 }
 
 Result<JointUpdate> joint_update(const std::vector<std::string>& names,
@@ -244,7 +244,7 @@ Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, s
     if (found) found = participant_->lookups().wait(fixed, b, at_b, deadline.left());
     return found;
   };
-  return after_wait(wait, ready, [&] {
+  return after_wait(participant_->lookups(), wait, ready, [&] {
     return participant_->two_instants().lookup(std::string(a), at_a, std::string(b), at_b,
                                                std::string(fixed),
                                                participant_->discovery().call_deadline());
@@ -334,7 +334,8 @@ Result<PathWatch> Client::watch(const std::string& a, const std::string& b,
   const auto ready = [&](Milliseconds left) {
     return participant_->lookups().wait(a, b, {}, left);
   };
-  return after_wait(wait, ready, [&] { return participant_->watches().watch(a, b, options); })
+  return after_wait(participant_->lookups(), wait, ready,
+                    [&] { return participant_->watches().watch(a, b, options); })
       .map([](auto path) { return PathWatch(path); });
 }
 
@@ -345,7 +346,8 @@ Result<EdgesWatch> Client::watch_edges(const std::vector<std::string>& ids,
     for (const std::string& id : ids) await_frame(*participant_, id, deadline);
     return Result<void>();
   };
-  return after_wait(wait, ready, [&] { return participant_->watches().watch_edges(ids, options); })
+  return after_wait(participant_->lookups(), wait, ready,
+                    [&] { return participant_->watches().watch_edges(ids, options); })
       .map([](auto edges) { return EdgesWatch(edges); });
 }
 
@@ -356,7 +358,7 @@ Result<Velocity> Client::velocity(const std::string& a, const std::string& b,
     then.at = query.at;
     return participant_->lookups().wait(a, b, then, left);
   };
-  return after_wait(wait, ready, [&] {
+  return after_wait(participant_->lookups(), wait, ready, [&] {
     return participant_->velocities().velocity(a, b, query,
                                                participant_->discovery().call_deadline());
   });
@@ -420,7 +422,8 @@ Result<std::vector<HistoryInfo>> Client::history(const std::string& id, Millisec
     await_frame(*participant_, id, Deadline(left));
     return Result<void>();
   };
-  return after_wait(wait, ready, [&] { return participant_->queries().history(id); });
+  return after_wait(participant_->lookups(), wait, ready,
+                    [&] { return participant_->queries().history(id); });
 }
 
 Result<std::vector<HistoryInfo>> Client::histories(const std::string& partition,

@@ -131,7 +131,8 @@ Result<ManyLookups::CloudPoses> ManyLookups::poses_of(std::string_view a, std::s
       if (found) found = lookups_.wait(query.fixed, b, then, deadline.left());
       return found;
     };
-    auto found = after_wait(wait, ready, [&] { return over_fixed(a, b, query, groups.instants); });
+    auto found =
+        after_wait(lookups_, wait, ready, [&] { return over_fixed(a, b, query, groups.instants); });
     if (found) found->of_point = std::move(groups.of_point);
     return found;
   }

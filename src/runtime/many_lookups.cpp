@@ -13,10 +13,6 @@
 namespace tfdude {
 namespace {
 
-// Between two rounds of lookups that wait, at least: at first, and at most.
-constexpr Milliseconds kShortestPause{1};
-constexpr Milliseconds kLongestPause{50};
-
 auto answers(const std::vector<ManyLookups::Found>& all) {
   return std::count_if(all.begin(), all.end(), [](const auto& one) { return one.has_value(); });
 }
@@ -73,7 +69,7 @@ Result<Trajectory> ManyLookups::trajectory(std::string_view a, std::string_view 
     (void)lookups_.wait(a, b, last, left);
     return {};
   };
-  return after_wait(wait, ready, [&] { return trajectory_once(a, b, instants, query); });
+  return after_wait(lookups_, wait, ready, [&] { return trajectory_once(a, b, instants, query); });
 }
 
 Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_view b,

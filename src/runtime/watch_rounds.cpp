@@ -102,8 +102,8 @@ WatchRounds::Entries WatchRounds::drop_unused() {
   }
   // A function of the user may hold the last client. That cannot end on the thread of rounds, for
   // which it waits.
-  for (const auto& entry : unused) {
-    if (const auto line = entry->watched->calls_on()) line->post([entry] {});
+  for (auto& entry : unused) {
+    if (const auto line = entry->watched->calls_on()) line->post([last = std::move(entry)] {});
   }
   return used;
 }
@@ -124,7 +124,8 @@ void WatchRounds::begin(Clock::time_point now) {
   for (const auto& entry : all_) {
     if (renews && period_ % entry->watched->periods() == 0) entry->due = true;
     const bool lacking = entry->lacking.exchange(false);
-    if (lacking || replan || entry->due) turns_.push_back(entry);
+    // What has no plan stays due until something changes.
+    if (lacking || replan || (renews && entry->due)) turns_.push_back(entry);
   }
 }
 

@@ -122,6 +122,12 @@ void WatchedPartition::deny(std::string why) {
   became_unreachable(std::move(why));
 }
 
+// Another of its groups may still be denied when one is answered.
+void WatchedPartition::on_complete() {
+  const Lock lock(mutex_);
+  if (std::exchange(denied_, false)) became_reachable();
+}
+
 void WatchedPartition::became_reachable() {
   if (!std::exchange(reachable_, true)) post({name_, ReachNews{true, {}}});
 }
@@ -327,7 +333,6 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (group == groups_.end()) return false;
   auto whole = group->received.whole(pushed);
   if (!whole) return false;
-  if (is_answer(*whole) && std::exchange(denied_, false)) became_reachable();
   if (frames_due_) post_frames();
   if (frames_due_ || is_too_much(whole->entries.size())) {
     group->received.skip(*whole);

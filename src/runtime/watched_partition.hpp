@@ -59,6 +59,7 @@ class WatchedPartition final : public Watched {
   bool on_no_plan(Error why, Clock::time_point now) override;
   bool on_deaf(Error why) override;
   bool on_denied(const Part& part, const Error* why) override;
+  void on_complete() override;
   /// Also because DDS may not have matched the readers yet.
   [[nodiscard]] bool lacks(Clock::time_point now) const override;
   [[nodiscard]] std::optional<Time> lacks_from() override;
@@ -152,7 +153,7 @@ class WatchedPartition final : public Watched {
   Planned planned_;               // until it is adopted
   mutable Mutex mutex_{LockRank::kWatchedPath};
   bool reachable_ TFDUDE_GUARDED_BY(mutex_) = false;
-  bool denied_ TFDUDE_GUARDED_BY(mutex_) = false;      // until an answer comes
+  bool denied_ TFDUDE_GUARDED_BY(mutex_) = false;      // until all groups are answered
   bool frames_due_ TFDUDE_GUARDED_BY(mutex_) = false;  // not yet posted; no values are until then
   std::uint64_t incarnation_ TFDUDE_GUARDED_BY(mutex_) = 0;
   std::vector<WatchedFrame> frames_ TFDUDE_GUARDED_BY(mutex_);

@@ -121,7 +121,7 @@ Watched::Looked WatchedPath::look(Clock::time_point now) {
     const bool goes_back = newest && newest_ && newest->stamp < newest_->stamp;
     if (now < tell_from_) {
       // Readers have it before it is told. It is shown again while an owner is gone.
-      if (newest && !goes_back) remember(std::move(newest));
+      if (written_ && newest && !goes_back) remember(std::move(newest));
       return {false, tell_from_};
     }
     if (options_.rate > 0) tell_from_ = now + watch_period(options_.rate);

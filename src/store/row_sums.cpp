@@ -146,6 +146,8 @@ Result<void> RowSums::put_all() {
   return done;
 }
 
+Result<void> RowSums::put_all(const std::string& name) { return table(name).put_all.run(); }
+
 namespace {
 
 // The keys that a query returns, as rows of a table.

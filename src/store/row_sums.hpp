@@ -23,6 +23,8 @@ class RowSums {
   [[nodiscard]] Result<void> clear(const std::string& table);
   /// Of all rows as they are.
   [[nodiscard]] Result<void> put_all();
+  /// Of one table.
+  [[nodiscard]] Result<void> put_all(const std::string& table);
 
  private:
   struct Table {

@@ -83,7 +83,7 @@ void PoseSender::publish(const StampedTransform& X) {
     return log({Errc::kInvalidInput, "the covariance of " + quote(settings_.child) + " in " +
                                          quote(settings_.frame) + " is unspecified"});
   }
-  errors_.succeeded();
+  errors_.has_data();
   publisher_->publish(*message);
 }
 

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <future>
-#include <limits.h>
 #include <pthread.h>
 #include <utility>
 
@@ -63,17 +62,13 @@ Result<void> threads_to_spare() {
     static_cast<const std::shared_future<void>*>(until)->wait();
     return nullptr;
   };
-  pthread_attr_t small;
-  pthread_attr_init(&small);
-  pthread_attr_setstacksize(&small, static_cast<std::size_t>(PTHREAD_STACK_MIN) * 4);
   std::size_t begun = 0;
   int error = 0;
   while (begun < threads.size() && error == 0) {
-    error = pthread_create(&threads[begun], &small, wait,
+    error = pthread_create(&threads[begun], nullptr, wait,
                            const_cast<void*>(static_cast<const void*>(&ended)));
     if (error == 0) ++begun;
   }
-  pthread_attr_destroy(&small);
   all.set_value();
   for (std::size_t i = 0; i < begun; ++i) pthread_join(threads[i], nullptr);
   if (error == 0) return {};

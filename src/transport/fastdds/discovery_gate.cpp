@@ -283,7 +283,11 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
     const auto& port = qos.wire_protocol().port;
     data_ports.first = port.portBase + port.domainIDGain * domain + port.offsetd3;
     data_ports.step = port.participantIDGain;
-    counts_channels_ = !qos.transport().user_transports.empty();
+    // Lists of multicast addresses alone leave out ports for messages to the participant alone.
+    counts_channels_ = !qos.transport().user_transports.empty() &&
+                       qos.wire_protocol().builtin.metatrafficMulticastLocatorList.empty() &&
+                       qos.wire_protocol().default_multicast_locator_list.empty() &&
+                       port.offsetd1 < port.offsetd3;
   }
   if (kSeesSent && only_udp(qos)) guard_->sees_all_sent();
   auto discovering = has_keys(qos) ? std::make_shared<std::mutex>() : nullptr;

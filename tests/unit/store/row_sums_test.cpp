@@ -265,4 +265,15 @@ TEST_CASE("a file of a format without the joints of entries has none that are kn
   }
 }
 
+TEST_CASE("a damaged row of a format without the joints of entries stays damaged") {
+  const Saved saved;
+  run(saved.file,
+      "UPDATE about SET epoch = 8; DELETE FROM sums WHERE name = 'configured_joints/tool'; "
+      "DROP TABLE configured_joints; PRAGMA user_version = 6");
+  for (int start = 0; start < 2; ++start) {
+    CHECK_FALSE(drop_wrong_rows(saved.file, "arms"));
+    CHECK_THAT(loaded(saved.file), ContainsSubstring("about 'arms'"));
+  }
+}
+
 }  // namespace tfdude
