@@ -144,7 +144,9 @@ void Waiter::attend(bool written) {
   const auto next = lookup_->next();
   if (std::exchange(wakes_, next) == next) return;
   process_->later("lookup", next - now(), [this, self = shared_from_this(), next] {
-    if (lookup_ != nullptr && wakes_ == next) attend(false);
+    if (lookup_ == nullptr || wakes_ != next) return;
+    wakes_ = {};  // it may be due again at once
+    attend(false);
   });
 }
 
