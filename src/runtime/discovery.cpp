@@ -74,7 +74,7 @@ void Discovery::wait_for_partition(const std::string& name, const Deadline& dead
   // A partition that hangs for a moment is reachable again without a change of the structure.
   constexpr Milliseconds kLook{50};
   Lock lock(structure_.mutex);
-  while (!deadline.over()) {
+  while (!deadline.over() && !ended_) {
     const auto owner = structure_.directory.owner(name);
     if (owner && (*owner == kHeldHere || structure_.directory.reachable(*owner))) return;
     (void)structure_.changed.wait_until(lock, deadline.within(kLook).at());

@@ -45,8 +45,10 @@ class Discovery {
   /// exclude all partitions that were discovered.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
-  /// Waits until a partition of this name is known and reachable.
+  /// Waits until a partition of this name is known and reachable, or the client ends.
   void wait_for_partition(const std::string& name, const Deadline& deadline);
+  /// The client ends: nobody waits for a partition any more, or will. Takes effect within 50 ms.
+  void end_waits() { ended_ = true; }
 
   /// The final error of an operation that failed and is not repeated.
   [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
@@ -70,6 +72,7 @@ class Discovery {
   // Participants that have not announced their frames by then are not waited for.
   const Clock::time_point told_by_;
   std::atomic<bool> complete_{false};
+  std::atomic<bool> ended_{false};
 };
 
 }  // namespace tfdude

@@ -84,6 +84,8 @@ Participant::~Participant() {
   // Callbacks may use all other parts, but wait no longer.
   lookups_.stop();
   watches_.end_waits();
+  structure_.clock.end_waits();
+  discovery_.end_waits();
   one_shots_.stop();
   memory_.stop();
   member_.stop_events();

@@ -34,14 +34,14 @@ class SourceClock {
   [[nodiscard]] Result<Time> await(const Deadline& deadline) {
     {
       Lock lock(mutex_);
-      (void)first_.wait_until(lock, deadline.at(), [this] { return now().has_value(); });
+      (void)first_.wait_until(lock, deadline.at(), [this] { return ended_ || now().has_value(); });
     }
     if (const auto time = now()) return *time;
     return fail(Errc::kNotYet, "the clock is external, and nobody has published the time");
   }
 
   /// Waits until a time. The system's clock may be set meanwhile, so it is looked at repeatedly.
-  /// @return kTimeout at the deadline; the message says what time it is
+  /// @return kTimeout at the deadline, which says what time it is; kTransport: the client ends
   [[nodiscard]] Result<void> wait_until(Time time, const Deadline& deadline) {
     constexpr Milliseconds kLook{50};
     ++waiting_;
@@ -49,7 +49,7 @@ class SourceClock {
       Lock lock(mutex_);
       for (auto now = this->now(); !now || *now < time; now = this->now()) {
         const auto steady = Deadline::Clock::now();
-        if (deadline.over(steady)) break;
+        if (ended_ || deadline.over(steady)) break;
         auto until = std::min(deadline.at(), steady + kLook);
         if (now && kind_ == ClockKind::kSystem) {
           const std::chrono::nanoseconds look = kLook;
@@ -61,8 +61,18 @@ class SourceClock {
     --waiting_;
     const auto now = this->now();
     if (now && *now >= time) return {};
+    if (ended_) {
+      return fail(Errc::kTransport, "the client has ended before it was " + readable(time));
+    }
     return fail(Errc::kTimeout, "it is not " + readable(time) + " within " + deadline.text() +
                                     ": the time is " + (now ? readable(*now) : "not known"));
+  }
+
+  /// The client ends: nobody waits for a time any more, or will.
+  void end_waits() {
+    ended_ = true;
+    { const Lock lock(mutex_); }
+    first_.notify_all();
   }
 
   /// Sets an external clock. @return the time before, if that was later; kInvalidInput.
@@ -88,6 +98,7 @@ class SourceClock {
   Mutex mutex_;  // of the wait only
   Condition first_;
   std::atomic<int> waiting_{0};  // for a time
+  std::atomic<bool> ended_{false};
 };
 
 }  // namespace tfdude

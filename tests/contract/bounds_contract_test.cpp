@@ -79,7 +79,6 @@ TEST_CASE("bounds: a call of several steps has one deadline for all") {
     if (call == 2) (void)client.roots();
     if (call == 3) (void)client.whether_exists("nobody");
     took = std::min(took, Clock::now() - start);
-    CHECK(Clock::now() - start >= Late::kDiscovery);
   }
   INFO("call " << call);
   CHECK(took < 130ms);

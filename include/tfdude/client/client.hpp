@@ -376,7 +376,8 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<Time> now();
 
   /// Waits until this client's clock (Options::clock) has reached a time.
-  /// @return kTimeout: not within `wait` of the system's time; the message says what time it is
+  /// @return kTimeout: not within `wait` of the system's time; the message says what time it is;
+  ///   kTransport: the client ends
   [[nodiscard]] Result<void> wait_until(Time time, Milliseconds wait);
   [[nodiscard]] Result<void> wait_until(ExternalTime time, Milliseconds wait) {
     return wait_until(stamp_of(time), wait);

@@ -66,24 +66,31 @@ struct Held {
 
 TEST_CASE("lifetimes: closing a client ends what its callbacks wait for") {
   Pair pair;
-  const int what = GENERATE(0, 1);
+  const int what = GENERATE(0, 1, 2, 3);
   REQUIRE(pair.node.add("hand", "arm", {}));
   std::atomic<bool> begun{false};
-  Result<StampedTransform> got;
+  std::optional<Error> got;
+  const auto note = [&](const auto& result) {
+    if (!result) got = result.error();
+  };
   auto pending = pair.client->lookup_async("arm", "hand", {}, kForEver, [&](const auto&) {
     Client& client = *pair.client;
     auto watch = client.watch("arm", "hand");
     if (!watch || !watch->wait_next(20s)) return;
     begun = true;
-    got =
-        what == 0 ? client.lookup_many("arm", {"nobody"}, {}, 20s).front() : watch->wait_next(20s);
+    if (what == 0) note(client.lookup_many("arm", {"nobody"}, {}, 20s).front());
+    if (what == 1) note(watch->wait_next(20s));
+    if (what == 2) note(client.wait_until(client.now().value() + 1h, 20s));
+    if (what == 3) note(client.histories("nowhere", 20s));
   });
   REQUIRE(eventually([&] { return begun.load(); }));
   const auto begin = std::chrono::steady_clock::now();
   pair.client.reset();
   CHECK(std::chrono::steady_clock::now() - begin < 10s);
-  REQUIRE_FALSE(got);
-  CHECK(got.error().code == (what == 0 ? Errc::kUnknownEnd : Errc::kTransport));
+  REQUIRE(got);
+  constexpr Errc kExpected[] = {Errc::kUnknownEnd, Errc::kTransport, Errc::kTransport,
+                                Errc::kUnknownPartition};
+  CHECK(got->code == kExpected[what]);
 }
 
 TEST_CASE("lifetimes: no listener runs after its client has ended even if changes wait") {
