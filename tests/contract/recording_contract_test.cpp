@@ -88,7 +88,8 @@ class Recorded {
     return all->size() == known_.size();
   }
 
-  // Whether the sample of this instant has come. A late one may come after newer ones.
+  // Whether the sample of this instant has come. A late one may come after newer ones, and so does
+  // one that was lost and is sent again.
   bool has(const std::string& frame, Time stamp) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return told_.count({frame, stamp}) > 0;
@@ -173,6 +174,13 @@ Transform random_value(Random& random) {
   return X;
 }
 
+// Of the samples of a change.
+std::vector<Time> stamps_of(int number) {
+  std::vector<Time> stamps;
+  for (int i = 0; i < 4; ++i) stamps.push_back(step(number) + std::chrono::milliseconds(250 * i));
+  return stamps;
+}
+
 // Two partitions whose frames move, come and go, with all kinds of values.
 class World {
  public:
@@ -225,7 +233,7 @@ class World {
       default:
         break;
     }
-    for (int i = 0; i < 4; ++i) sample(stamp + std::chrono::milliseconds(250 * i));
+    for (const Time each : stamps_of(number)) sample(each);
     return late;
   }
 
@@ -275,6 +283,11 @@ TEST_CASE("recording: it answers as the live system did, with covariance, at any
       const auto late = world.change(number);
       REQUIRE(eventually([&] { return recorded.has_all(world.arm(), *client); }));
       if (late) REQUIRE(eventually([&] { return recorded.has("elbow", *late); }));
+      for (const Time stamp : stamps_of(number)) {
+        for (const char* moving : {"lift", "elbow", "wrist"}) {
+          REQUIRE(eventually([&] { return recorded.has(moving, stamp); }));
+        }
+      }
       frames[number] = lines(client->frames().value());
       const std::vector<std::string> names{"world", "lift", "shoulder", "hand", "wrist", "tool"};
       for (int i = 0; i < 8; ++i) {
