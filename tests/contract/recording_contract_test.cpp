@@ -137,7 +137,13 @@ class Recorded {
 
   // The covariance of a lookup also contains common errors.
   static bool is_same(const WatchedValue& told, const StampedTransform& owned) {
+    Matrix6d sigma = told.X_PC.covariance.of_specified().matrix();
+    for (const CommonError& one : told.correlation.common_errors) {
+      sigma += one.loading * one.loading.transpose();
+    }
+    const Matrix6d of_owner = owned.covariance.of_specified().matrix();
     return told.correlation.common_errors.empty() == owned.basis.sources.empty() &&
+           (sigma - of_owner).cwiseAbs().maxCoeff() < 1e-12 &&
            (told.X_PC.pose.matrix() - owned.pose.matrix()).cwiseAbs().maxCoeff() < 1e-12;
   }
 
