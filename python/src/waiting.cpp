@@ -9,6 +9,7 @@ void check_interrupted() {
   check_usable();
 }
 
+// As the library's own, of which only installed headers are seen here.
 bool may_return(Errc code) {
   return is_unknown(code) || code == Errc::kNotConnected || code == Errc::kUnreachable ||
          code == Errc::kTimeout || code == Errc::kNotOwner || code == Errc::kNotYet;

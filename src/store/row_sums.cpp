@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 
 #include "tfdude/base/id.hpp"
 
@@ -204,15 +205,10 @@ Result<std::vector<WrongRow>> find_wrong_rows(Database& database, std::int64_t f
 
 namespace {
 
-// What an entry said of the configuration, of which a part is damaged. Its id stays, so that it
-// does not count as new, which would replace what was set at run time.
-Result<void> make_unknown(Database& database, const std::string& id) {
-  if (!check_id(id, "id")) return {};
-  for (const char* sql :
-       {"DELETE FROM configured_ties WHERE id = ?1", "DELETE FROM configured_joints WHERE id = ?1",
-        "INSERT OR REPLACE INTO configured VALUES(?1, '', x'')",
-        "INSERT OR REPLACE INTO sums SELECT 'configured/' || id, row_sum(id, "
-        "parent, x_pc) FROM configured WHERE id = ?1"}) {
+// Runs statements one after the other, each for one id.
+Result<void> run_for(Database& database, const std::string& id,
+                     std::initializer_list<const char*> statements) {
+  for (const char* sql : statements) {
     auto statement = prepared(database, sql);
     auto done = statement ? statement->run(id) : tl::unexpected(statement.error());
     if (!done) return done;
@@ -220,17 +216,25 @@ Result<void> make_unknown(Database& database, const std::string& id) {
   return {};
 }
 
+// What an entry said of the configuration, of which a part is damaged. Its id stays, so that it
+// does not count as new, which would replace what was set at run time.
+Result<void> make_unknown(Database& database, const std::string& id) {
+  if (!check_id(id, "id")) return {};
+  return run_for(
+      database, id,
+      {"DELETE FROM configured_ties WHERE id = ?1", "DELETE FROM configured_joints WHERE id = ?1",
+       "INSERT OR REPLACE INTO configured VALUES(?1, '', x'')",
+       "INSERT OR REPLACE INTO sums SELECT 'configured/' || id, row_sum(id, "
+       "parent, x_pc) FROM configured WHERE id = ?1"});
+}
+
 // What is stored beside a correlation is the covariance of the edge's own part, which is too small
 // without it: only the pose stays, in its 7 numbers.
 Result<void> leave_covariance_out(Database& database, const std::string& id) {
-  for (const char* sql : {"UPDATE frames SET x_pc = substr(x_pc, 1, 56) WHERE id = ?1",
-                          "INSERT OR REPLACE INTO sums SELECT 'frames/' || id, row_sum(id, parent, "
-                          "x_pc, since) FROM frames WHERE id = ?1"}) {
-    auto statement = prepared(database, sql);
-    auto done = statement ? statement->run(id) : tl::unexpected(statement.error());
-    if (!done) return done;
-  }
-  return {};
+  return run_for(database, id,
+                 {"UPDATE frames SET x_pc = substr(x_pc, 1, 56) WHERE id = ?1",
+                  "INSERT OR REPLACE INTO sums SELECT 'frames/' || id, row_sum(id, parent, "
+                  "x_pc, since) FROM frames WHERE id = ?1"});
 }
 
 bool is_of_entry(const std::string& table) {

@@ -98,7 +98,7 @@ TEST_CASE("admission: whether somebody is awaited can be asked while a message i
   CHECK(door.admission.awaits_authentication());
 }
 
-TEST_CASE("admission: who is met is awaited until the callback has ended") {
+TEST_CASE("admission: an identity is awaited until the callback has ended") {
   Admission* asked = nullptr;
   std::vector<bool> awaited;
   Admission admission{[&](const PeerId&, const Announcement&) {
