@@ -206,7 +206,7 @@ void WatchRounds::answered(Clock::time_point now) {
     }
   }
   if (!all) return finish_turn(false);
-  if (from_) watched.on_told_from(*from_);
+  if (from_) watched.on_told_from(*from_, now);
   // Only the first answers show that one edge is ahead of the data of another.
   if (!std::exchange(asked_again_, true)) {
     if (const auto from = watched.lacks_earlier()) return ask(from, now);

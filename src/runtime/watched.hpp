@@ -97,7 +97,7 @@ class Watched {
   /// As lacks_from(), if the answers show that still earlier samples are needed.
   [[nodiscard]] virtual std::optional<Time> lacks_earlier() { return std::nullopt; }
   /// All owners have told all samples from this instant on.
-  virtual void on_told_from(Time /*from*/) {}
+  virtual void on_told_from(Time /*from*/, Clock::time_point /*now*/) {}
   /// The groups whose values are needed.
   [[nodiscard]] virtual std::set<std::uint64_t> groups(Clock::time_point now) = 0;
   /// After how many periods of renewal it is renewed.

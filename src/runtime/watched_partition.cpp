@@ -175,13 +175,15 @@ bool WatchedPartition::take_over() {
     if (frames_due_) post_frames();
     return false;
   }
-  if (begins) groups_.clear();
+  if (begins) {
+    groups_.clear();
+    missing_from_.reset();
+    missing_since_asked_.reset();
+  }
   const bool new_frames = begins || planned_.frames != frames_;
   carry_over();
   incarnation_ = planned_.incarnation;
   answered_.reset();
-  skipped_from_.reset();
-  missing_from_.reset();
   misses_recent();
   if (new_frames || frames_due_) post_frames();
   return true;
@@ -247,18 +249,20 @@ void WatchedPartition::forget_told() {
 
 void WatchedPartition::misses(Time from) {
   missing_from_ = std::min(missing_from_.value_or(from), from);
+  missing_since_asked_ = std::min(missing_since_asked_.value_or(from), from);
   for (Known& known : known_) {
-    if (!known.newest || !known.told.empty()) continue;
+    if (!known.newest) continue;
     known.told.add(*known.newest, known.commit, known.X, known.correlation);
   }
 }
 
 void WatchedPartition::misses_recent() {
-  if (missing_from_) return;
+  if (missing_since_asked_) return;
   if (const auto from = recent()) misses(*from);
 }
 
 void WatchedPartition::note_skipped(const Group& group, const PushedValues& answer) {
+  std::optional<Time> skipped;
   for (const PushedValue* first : first_samples(answer, group.frames.size())) {
     if (group.frames[first->index] == kGone) continue;
     const Known& known = known_[group.frames[first->index]];
@@ -266,14 +270,19 @@ void WatchedPartition::note_skipped(const Group& group, const PushedValues& answ
     if (known.history == 0 || (has_samples && *first->stamp <= *known.newest)) continue;
     const Time from =
         has_samples ? *known.newest : std::max<Time>(Time(), *first->stamp - kStreamed);
-    skipped_from_ = std::min(skipped_from_.value_or(from), from);
+    skipped = std::min(skipped.value_or(from), from);
   }
-  if (skipped_from_) misses(*skipped_from_);
+  if (skipped) misses(*skipped);
 }
 
-void WatchedPartition::on_told_from(Time from) {
+void WatchedPartition::on_told_from(Time from, Clock::time_point now) {
   const Lock lock(mutex_);
-  if (skipped_from_ && from <= *skipped_from_) skipped_from_.reset();
+  if (!missing_from_ || from > *missing_from_) return;
+  // The owner may have answered before it wrote what was lost since.
+  missing_from_ = missing_since_asked_;
+  if (missing_from_ || lacks_any()) return;
+  if (settles(now)) misses_recent();
+  forget_told();
 }
 
 void WatchedPartition::admit(const Group& group, PushedValue& entry, const Message& message,
@@ -353,11 +362,8 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   for (PushedValue& entry : whole->entries) admit(*group, entry, message, news.values);
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
-  if (lacks_any() || skipped_from_) return true;
-  if (!missing_from_ && !settles(now)) return false;
-  missing_from_.reset();
+  if (lacks_any() || missing_since_asked_) return true;
   if (settles(now)) misses_recent();
-  forget_told();
   return false;
 }
 
@@ -372,7 +378,7 @@ bool WatchedPartition::settles(Clock::time_point now) const {
 
 bool WatchedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
-  return lacks_any() || skipped_from_ || frames_due_ || settles(now);
+  return lacks_any() || missing_from_ || frames_due_ || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.
@@ -392,6 +398,7 @@ std::optional<Time> WatchedPartition::recent() const {
 
 std::optional<Time> WatchedPartition::lacks_from() {
   const Lock lock(mutex_);
+  missing_since_asked_.reset();
   return asked_from_ = missing_from_;
 }
 

@@ -63,7 +63,7 @@ class WatchedPartition final : public Watched {
   /// Also because DDS may not have matched the readers yet.
   [[nodiscard]] bool lacks(Clock::time_point now) const override;
   [[nodiscard]] std::optional<Time> lacks_from() override;
-  void on_told_from(Time from) override;
+  void on_told_from(Time from, Clock::time_point now) override;
   /// The groups of the plan before end here.
   [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
   /// A reply has all values of the partition.
@@ -159,10 +159,11 @@ class WatchedPartition final : public Watched {
   std::vector<WatchedFrame> frames_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<Known> known_ TFDUDE_GUARDED_BY(mutex_);  // by frame
   std::vector<Group> groups_ TFDUDE_GUARDED_BY(mutex_);
-  // Samples were missing from this instant on.
+  // Samples from this instant on may be missing, until answers have told all of them.
   std::optional<Time> missing_from_ TFDUDE_GUARDED_BY(mutex_);
-  std::optional<Time> skipped_from_ TFDUDE_GUARDED_BY(mutex_);  // samples after it are missing
-  std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);    // an answer tells what was since
+  // Of these, what was noticed after the last request.
+  std::optional<Time> missing_since_asked_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);  // an answer tells what was since
   std::optional<Clock::time_point> answered_ TFDUDE_GUARDED_BY(mutex_);
 };
 

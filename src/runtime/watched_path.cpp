@@ -269,7 +269,7 @@ std::optional<Time> WatchedPath::skipped_from() const {
   return latest == nullptr || options_.rate > 0 ? std::nullopt : latest->skipped_from();
 }
 
-void WatchedPath::on_told_from(Time from) {
+void WatchedPath::on_told_from(Time from, Clock::time_point /*now*/) {
   const Lock lock(mutex_);
   if (WatchMirror* latest = this->latest()) latest->told_from(from);
 }

@@ -127,7 +127,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] bool lacks(Clock::time_point /*now*/) const override { return !up_to_date(); }
   [[nodiscard]] std::optional<Time> lacks_from() override;
   [[nodiscard]] std::optional<Time> lacks_earlier() override { return lacks_from(); }
-  void on_told_from(Time from) override;
+  void on_told_from(Time from, Clock::time_point now) override;
   [[nodiscard]] std::set<std::uint64_t> groups(Clock::time_point now) override;
   [[nodiscard]] unsigned periods() const override { return 1; }
 

@@ -40,9 +40,11 @@ struct WatchedOwner {
     return {plan.groups[0].id, std::get<WatchRequest>(plan.groups[0].part.request.body)};
   }
   void answer(WatchedGroup& group) {
-    const PushedValues all = group.snapshot(forest, watch.lacks_from(), true).value();
+    const std::optional<Time> from = watch.lacks_from();
+    const PushedValues all = group.snapshot(forest, from, true).value();
     group.begin(all);
     (void)watch.take(all, now);
+    if (from) watch.on_told_from(*from, now);
   }
   // [ms]
   std::vector<long> told() {
@@ -158,6 +160,7 @@ TEST_CASE("watched partition: what an answer shows to be lost is asked for") {
   (void)owner.watch.take(group.next_push(owner.forest), owner.now);
   (void)owner.watch.groups(owner.now);
   owner.now += WatchedPartition::kSettle + 100ms;
+  owner.answer(group);
   REQUIRE(owner.forest.update("arm", along_x(1), Time(1s) + 5ms));
   (void)owner.watch.take(group.next_push(owner.forest), owner.now);
   REQUIRE_FALSE(owner.watch.lacks(owner.now));
@@ -170,7 +173,6 @@ TEST_CASE("watched partition: what an answer shows to be lost is asked for") {
   const std::optional<Time> from = owner.watch.lacks_from();
   REQUIRE(from == Time(1s) + 5ms);
   owner.answer(group);
-  owner.watch.on_told_from(*from);
   CHECK_FALSE(owner.watch.lacks(owner.now));
   CHECK(eventually([&] { return owner.told().size() >= 4; }));
   CHECK(owner.told() == std::vector<long>{1000, 1005, 1020, 1010});
@@ -255,6 +257,7 @@ struct SettledOwner : WatchedOwner {
     push();
     (void)watch.groups(now);
     now += WatchedPartition::kSettle + 100ms;
+    answer(*group);
     write("arm", 5ms);
     push();
     REQUIRE_FALSE(watch.lacks(now));
@@ -267,9 +270,7 @@ struct SettledOwner : WatchedOwner {
   // What a round does if something is missing.
   void ask() {
     REQUIRE(watch.lacks(now));
-    const std::optional<Time> from = watch.lacks_from();
     answer(*group);
-    if (from) watch.on_told_from(*from);
   }
   std::optional<WatchedGroup> group;
 };
