@@ -95,12 +95,13 @@ Result<Part> route_to(const Directory& directory, Owner owner, Request request) 
   return Part{owner, directory.name(owner), std::move(request)};
 }
 
+tl::unexpected<Error> fail_without_partition(const std::string& name) {
+  return fail_about_partition(Errc::kUnknownPartition, "no partition " + quote(name), name);
+}
+
 Result<Part> route_to_partition(const Directory& directory, Request request) {
   const auto owner = directory.owner(request.id);
-  if (!owner) {
-    return fail_about_partition(Errc::kUnknownPartition, "no partition " + quote(request.id),
-                                request.id);
-  }
+  if (!owner) return fail_without_partition(request.id);
   return route_to(directory, *owner, std::move(request));
 }
 
@@ -118,7 +119,7 @@ Result<Part> route_add(const Forest& forest, const Directory& directory, const s
   Owner owner = parent ? parent->owner : kHeldHere;
   if (!partition.empty()) {
     const auto named = directory.owner(partition);
-    if (!named) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+    if (!named) return fail_without_partition(partition);
     owner = *named;
   } else if (request.parent.empty() && directory.name(kHeldHere).empty()) {
     return fail(Errc::kInvalidInput,

@@ -35,6 +35,9 @@ struct LookupPlan {
 /// A request to one owner. @return kUnreachable.
 [[nodiscard]] Result<Part> route_to(const Directory& directory, Owner owner, Request request);
 
+/// kUnknownPartition.
+[[nodiscard]] tl::unexpected<Error> fail_without_partition(const std::string& name);
+
 /// A request to the partition whose name is its id. @return kUnknownPartition, kUnreachable.
 [[nodiscard]] Result<Part> route_to_partition(const Directory& directory, Request request);
 

@@ -6,6 +6,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/routing.hpp"
 #include "recording/reading.hpp"
 #include "tree/over_fixed.hpp"
 
@@ -230,13 +231,13 @@ std::vector<PartitionInfo> Recording::partitions() const { return impl_->state()
 
 Result<std::vector<JointInfo>> Recording::joints(const std::string& partition) const {
   const auto* joints = impl_->state().joints(partition);
-  if (joints == nullptr) return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+  if (joints == nullptr) return fail_without_partition(partition);
   return *joints;
 }
 
 Result<std::vector<HistoryInfo>> Recording::histories(const std::string& partition) const {
   if (impl_->state().joints(partition) == nullptr) {
-    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+    return fail_without_partition(partition);
   }
   std::vector<HistoryInfo> all;
   for (HistoryInfo& history : impl_->state().forest().histories()) {

@@ -56,7 +56,8 @@ Result<void> Discovery::await(const Deadline& deadline) {
     if (structure_.directory.behind() != nullptr) fell_behind();
   }
   while (!complete()) {
-    if (deadline.over()) return tl::unexpected(undecided("not all frames are known", deadline));
+    if (deadline.over())
+      return tl::unexpected(undecided({Errc::kTimeout, "not all frames are known"}, deadline));
     wait_for_change(deadline);
   }
   return nobody_but_excluded();
@@ -83,7 +84,7 @@ void Discovery::wait_for_partition(const std::string& name, const Deadline& dead
 
 Error Discovery::last_word(Error error, const TimeLimit& limit) {
   if (!may_appear(error.code)) return error;
-  return complete() ? explained(std::move(error)) : undecided(error.message, limit);
+  return complete() ? explained(std::move(error)) : undecided(error, limit);
 }
 
 void Discovery::wait_for_change(const Deadline& deadline) {
@@ -117,7 +118,7 @@ Error Discovery::explained(Error error) {
           error.frame, missed->name};
 }
 
-Error Discovery::undecided(const std::string& what, const TimeLimit& limit) {
+Error Discovery::undecided(const Error& error, const TimeLimit& limit) {
   std::string missing = std::string("no participant was discovered yet; ") + kHint;
   // Before the lock is taken: the transport reports presences under a lock of its own.
   const bool awaits_presence = transport_.awaits_presence();
@@ -141,7 +142,9 @@ Error Discovery::undecided(const std::string& what, const TimeLimit& limit) {
       missing = "more participants may be discovered";
     }
   }
-  return {Errc::kTimeout, what + ", as far as is known after " + limit.text() + ": " + missing};
+  return {Errc::kTimeout,
+          error.message + ", as far as is known after " + limit.text() + ": " + missing,
+          error.frame, error.partition};
 }
 
 }  // namespace tfdude

@@ -54,7 +54,7 @@ class Discovery {
   [[nodiscard]] Error last_word(Error error, const TimeLimit& limit);
 
   /// Why a result was not certain when the deadline was over: kTimeout.
-  [[nodiscard]] Error undecided(const std::string& what, const TimeLimit& limit);
+  [[nodiscard]] Error undecided(const Error& error, const TimeLimit& limit);
 
   /// Explains an error about something missing, if others know more.
   [[nodiscard]] Error explained(Error error);

@@ -109,7 +109,10 @@ Result<std::vector<KnownFrame>> OnDemand::ask(const FramesRequest& request,
     std::this_thread::sleep_until(deadline.within(pause).at());
     pause = std::min(2 * pause, kLastPause);
   }
-  if (!last) return tl::unexpected(discovery_.undecided(name_of(request) + " may exist", deadline));
+  if (!last) {
+    const Error open{Errc::kTimeout, name_of(request) + " may exist"};
+    return tl::unexpected(discovery_.undecided(open, deadline));
+  }
   return fail(Errc::kTimeout, "no partition has said where " + name_of(request) + " is, within " +
                                   deadline.text() + ": " + last->message);
 }

@@ -144,7 +144,7 @@ Result<void> Requests::conclude(const Call& call, const Deadline& deadline) {
   if (call.certainty() == Call::Certainty::kKnown) {
     return tl::unexpected(discovery_.explained(outcome.error()));
   }
-  return tl::unexpected(discovery_.undecided(outcome.error().message, deadline));
+  return tl::unexpected(discovery_.undecided(outcome.error(), deadline));
 }
 
 std::vector<Reply> Requests::ask(std::vector<Part>& parts, const Deadline& deadline) {

@@ -7,6 +7,7 @@
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/number.hpp"
 
+#include "partition/routing.hpp"
 #include "runtime/member_runner.hpp"
 #include "runtime/memory_reads.hpp"
 #include "runtime/requests.hpp"
@@ -99,7 +100,7 @@ Result<std::shared_ptr<WatchedPartition>> WatchClient::watch_partition(
   const Deadline deadline = context_.discovery.call_deadline();
   auto known = context_.requests.find(deadline, [&](const Directory& directory) -> Result<void> {
     if (directory.owner(partition)) return {};
-    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
+    return fail_without_partition(partition);
   });
   if (!known) return tl::unexpected(std::move(known.error()));
   // So that the first list of frames is complete; if something is missing, it follows.

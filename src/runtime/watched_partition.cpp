@@ -53,7 +53,7 @@ WatchedPartition::WatchedPartition(std::string name, double rate, Listener liste
 
 Result<void> WatchedPartition::plan(const KnownStructure& known) {
   const auto owner = known.directory.owner(name_);
-  if (!owner) return fail(Errc::kUnknownPartition, "no partition " + quote(name_));
+  if (!owner) return fail_without_partition(name_);
   if (auto ready = route_to(known.directory, *owner, {}); !ready) {
     return tl::unexpected(std::move(ready.error()));
   }
@@ -104,9 +104,20 @@ bool WatchedPartition::on_no_plan(Error why, Clock::time_point /*now*/) {
   {
     const Lock lock(mutex_);
     denied_ = false;  // it may return as another process
+    if (why.code == Errc::kUnknownPartition) forget_all();
   }
   became_unreachable(std::move(why.message));
   return true;
+}
+
+// The partition was forgotten. If it returns, it is new.
+void WatchedPartition::forget_all() {
+  if (incarnation_ == 0) return;
+  incarnation_ = 0;
+  groups_.clear();
+  known_.clear();
+  frames_.clear();
+  post_frames();
 }
 
 void WatchedPartition::became_unreachable(std::string why) {

@@ -130,6 +130,7 @@ class WatchedPartition final : public Watched {
   /// Keeps what is known of edges that stay in the plan, and the groups of before.
   void carry_over() TFDUDE_REQUIRES(mutex_);
   void became_unreachable(std::string why);
+  void forget_all() TFDUDE_REQUIRES(mutex_);
   /// The watch is denied, or cannot be heard: until an answer comes it does not count as reachable.
   void deny(std::string why);
   void became_reachable() TFDUDE_REQUIRES(mutex_);

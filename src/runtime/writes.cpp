@@ -5,6 +5,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "calls/rewrite_task.hpp"
+#include "partition/routing.hpp"
 
 namespace tfdude {
 namespace {
@@ -130,9 +131,7 @@ Result<void> Writes::forget(const std::string& partition) {
 
 Result<std::vector<Part>> Writes::route_forget(const Directory& directory,
                                                const std::string& partition) {
-  if (!directory.owner(partition)) {
-    return fail(Errc::kUnknownPartition, "no partition " + quote(partition));
-  }
+  if (!directory.owner(partition)) return fail_without_partition(partition);
   if (auto ok = directory.check_not_there(partition); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }

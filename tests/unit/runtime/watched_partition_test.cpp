@@ -248,6 +248,27 @@ TEST_CASE("watched partition: an owner that denies the watch is not called reach
   CHECK(reached == std::vector<bool>{true, false, true});
 }
 
+TEST_CASE("watched partition: one that was forgotten has no frames, and returns as a new one") {
+  WatchedOwner owner;
+  std::vector<std::size_t> frames;
+  owner.heard = [&](const PartitionNews& news) {
+    const std::lock_guard lock(owner.mutex);
+    if (const auto* all = std::get_if<FramesNews>(&news.what)) frames.push_back(all->frames.size());
+  };
+  WatchedGroup group = owner.plan();
+  owner.answer(group);
+  CHECK(owner.watch.on_no_plan({Errc::kUnreachable, "it is lost"}, owner.now));
+  CHECK(owner.watch.on_no_plan({Errc::kUnknownPartition, "no such partition"}, owner.now));
+  CHECK(owner.watch.on_no_plan({Errc::kUnknownPartition, "no such partition"}, owner.now));
+  (void)owner.watch.take(group.snapshot(owner.forest, {}).value(), owner.now);
+  group = owner.plan();
+  owner.answer(group);
+  CHECK(eventually([&] { return owner.told().size() >= 2; }));
+  CHECK(owner.told() == std::vector<long>{1000, 1000});
+  const std::lock_guard lock(owner.mutex);
+  CHECK(frames == std::vector<std::size_t>{2, 0, 2});
+}
+
 // An owner of two edges; the first pushes of the watch were taken.
 struct SettledOwner : WatchedOwner {
   SettledOwner() {
