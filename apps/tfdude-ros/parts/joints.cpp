@@ -19,9 +19,10 @@ Result<void> JointsIn::start(RosDomain& domain, const IsNeighbour& is_own) {
 
 void JointsIn::stop() {
   worker_.stop();
-  spdlog::info("joints of ROS: taken={} refused={}; of their stamps: {}; dropped messages={}",
-               import_.counts().taken, import_.counts().refused, import_.stamps().summary(),
-               worker_.dropped());
+  spdlog::info(
+      "joints of ROS: taken={} refused={}; of their stamps: {}; messages dropped={} not sent={}",
+      import_.counts().taken, import_.counts().refused, import_.stamps().summary(),
+      worker_.dropped(), not_sent_);
 }
 
 void JointsIn::take(const JointState& message) {
@@ -30,7 +31,9 @@ void JointsIn::take(const JointState& message) {
   if (positions.joints.empty()) return;
   const auto sent = node_.publish_joints(std::move(positions.joints), positions.stamp);
   // What comes between may be of another publisher, with joints that are known.
-  if (!sent && errors_.is_new(sent.error())) {
+  if (sent) return;
+  ++not_sent_;
+  if (errors_.is_new(sent.error())) {
     spdlog::warn("joints of ROS: {}", sent.error().message);
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <set>
@@ -31,7 +32,8 @@ class JointsIn {
   Node& node_;
   JointImport import_;
   ErrorReports errors_;
-  cli::Worker worker_;  // last: it uses the other members
+  std::uint64_t not_sent_ = 0;  // messages, of which some joints may have been sent
+  cli::Worker worker_;          // last: it uses the other members
 };
 
 /// Sends the joints of tf-dude to /joint_states.
