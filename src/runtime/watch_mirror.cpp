@@ -116,9 +116,7 @@ void WatchMirror::inherit(const WatchMirror& before) {
     edges_[i].complete = edge.complete;
   }
   forest_.take(handles_, values);
-  if (before.skipped_from_) {
-    skipped_from_ = std::min(skipped_from_.value_or(*before.skipped_from_), *before.skipped_from_);
-  }
+  if (const auto from = before.skipped_from()) skipped_.add(*from);
 }
 
 std::vector<Time> WatchMirror::stamps(std::string_view id, Time after) const {
@@ -175,7 +173,7 @@ void WatchMirror::note_skipped(const Source& source, const PushedValues& answer)
     const Edge& edge = edges_[index];
     const bool begins = first->history > edge.history;
     const Time known = begins ? Time() : edge.complete.value_or(Time());
-    if (*first->stamp > known) skipped_from_ = std::min(skipped_from_.value_or(known), known);
+    if (*first->stamp > known) skipped_.add(known);
   }
 }
 

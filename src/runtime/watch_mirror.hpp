@@ -10,6 +10,7 @@
 
 #include "partition/routing.hpp"
 #include "partition/watching.hpp"
+#include "runtime/missing_samples.hpp"
 #include "tree/forest.hpp"
 
 namespace tfdude {
@@ -96,11 +97,11 @@ class WatchMirror {
 
   /// The instant after which answers have left samples out, as an answer tells only the newest ones
   /// unless it is asked for more: messages were lost before it, or come after it.
-  [[nodiscard]] std::optional<Time> skipped_from() const { return skipped_from_; }
-  /// All samples from this instant on have been told since.
-  void told_from(Time from) {
-    if (skipped_from_ && *skipped_from_ >= from) skipped_from_.reset();
-  }
+  [[nodiscard]] std::optional<Time> skipped_from() const { return skipped_.from(); }
+  /// As skipped_from(), for a request that follows.
+  [[nodiscard]] std::optional<Time> ask_for_skipped() { return skipped_.ask(); }
+  /// All owners have answered a request for all samples from this instant on.
+  void told_from(Time from) { skipped_.told(from); }
 
  private:
   struct Edge {
@@ -141,7 +142,7 @@ class WatchMirror {
   std::vector<Handle> handles_;  // by edge, as the others
   std::vector<Edge> edges_;
   std::vector<Source> sources_;
-  std::optional<Time> skipped_from_;
+  MissingSamples skipped_;
 };
 
 }  // namespace tfdude

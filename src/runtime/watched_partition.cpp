@@ -188,8 +188,7 @@ bool WatchedPartition::take_over() {
   }
   if (begins) {
     groups_.clear();
-    missing_from_.reset();
-    missing_since_asked_.reset();
+    missing_ = {};
   }
   const bool new_frames = begins || planned_.frames != frames_;
   carry_over();
@@ -242,7 +241,7 @@ bool WatchedPartition::is_news(const PushedValue& entry, Known& known, const Mes
   if (!entry.stamp && !entry.cleared && (!message.follows_on || is_old)) return false;
   if (entry.cleared && is_old) return false;
   if (!is_late) return !is_old || entry.stamp != known.newest;
-  if (message.reply ? !missing_from_ : period_.count() != 0) return false;
+  if (message.reply ? !missing_.from() : period_.count() != 0) return false;
   return known.told.is_news(entry, message.commit, message.reply);
 }
 
@@ -253,14 +252,13 @@ bool WatchedPartition::is_pushed_twice() const {
 
 void WatchedPartition::forget_told() {
   if (is_pushed_twice()) return;
-  std::optional<Time> again = missing_from_;
+  std::optional<Time> again = missing_.from();
   if (again && asked_from_) again = std::min(*again, *asked_from_);
   for (Known& known : known_) known.told.keep_from(again);
 }
 
 void WatchedPartition::misses(Time from) {
-  missing_from_ = std::min(missing_from_.value_or(from), from);
-  missing_since_asked_ = std::min(missing_since_asked_.value_or(from), from);
+  missing_.add(from);
   for (Known& known : known_) {
     if (!known.newest) continue;
     known.told.add(*known.newest, known.commit, known.X, known.correlation);
@@ -268,7 +266,7 @@ void WatchedPartition::misses(Time from) {
 }
 
 void WatchedPartition::misses_recent() {
-  if (missing_since_asked_) return;
+  if (missing_.since_asked()) return;
   if (const auto from = recent()) misses(*from);
 }
 
@@ -288,10 +286,8 @@ void WatchedPartition::note_skipped(const Group& group, const PushedValues& answ
 
 void WatchedPartition::on_told_from(Time from, Clock::time_point now) {
   const Lock lock(mutex_);
-  if (!missing_from_ || from > *missing_from_) return;
-  // The owner may have answered before it wrote what was lost since.
-  missing_from_ = missing_since_asked_;
-  if (missing_from_ || lacks_any()) return;
+  missing_.told(from);
+  if (missing_.from() || lacks_any()) return;
   if (settles(now)) misses_recent();
   forget_told();
 }
@@ -322,7 +318,7 @@ void WatchedPartition::admit(const Group& group, PushedValue& entry, const Messa
     known.told.corrected(message.commit);
   }
   const bool settling = !answered_ && period_.count() == 0;
-  if (entry.stamp && (missing_from_ || settling || is_pushed_twice())) {
+  if (entry.stamp && (missing_.from() || settling || is_pushed_twice())) {
     known.told.add(*entry.stamp, message.commit, entry.X, entry.correlation);
   }
   if (!late) {
@@ -364,7 +360,7 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   if (!message.follows_on) {
     misses_recent();
     // Of edges that had no samples, all may be missing.
-    if (!missing_from_ && group->received.answered()) misses(Time());
+    if (!missing_.from() && group->received.answered()) misses(Time());
   }
   if (whole->after == 0 && !is_old && period_.count() == 0) note_skipped(*group, *whole);
   if (correlated_entries(*whole) > 0) spread_correlations(whole->entries);
@@ -373,7 +369,7 @@ bool WatchedPartition::take(const PushedValues& pushed, Clock::time_point now) {
   for (PushedValue& entry : whole->entries) admit(*group, entry, message, news.values);
   const std::size_t count = news.values.size();
   if (count > 0) post({name_, std::move(news)}, count);
-  if (lacks_any() || missing_since_asked_) return true;
+  if (lacks_any() || missing_.since_asked()) return true;
   if (settles(now)) misses_recent();
   return false;
 }
@@ -389,7 +385,7 @@ bool WatchedPartition::settles(Clock::time_point now) const {
 
 bool WatchedPartition::lacks(Clock::time_point now) const {
   const Lock lock(mutex_);
-  return lacks_any() || missing_from_ || frames_due_ || settles(now);
+  return lacks_any() || missing_.from() || frames_due_ || settles(now);
 }
 
 // The oldest of the newest samples of the edges that are streamed now.
@@ -409,8 +405,7 @@ std::optional<Time> WatchedPartition::recent() const {
 
 std::optional<Time> WatchedPartition::lacks_from() {
   const Lock lock(mutex_);
-  missing_since_asked_.reset();
-  return asked_from_ = missing_from_;
+  return asked_from_ = missing_.ask();
 }
 
 std::set<std::uint64_t> WatchedPartition::groups(Clock::time_point now) {

@@ -17,6 +17,7 @@
 #include "base/mutex.hpp"
 #include "partition/watching.hpp"
 #include "runtime/callbacks.hpp"
+#include "runtime/missing_samples.hpp"
 #include "runtime/told_samples.hpp"
 #include "runtime/watched.hpp"
 
@@ -160,10 +161,7 @@ class WatchedPartition final : public Watched {
   std::vector<WatchedFrame> frames_ TFDUDE_GUARDED_BY(mutex_);
   std::vector<Known> known_ TFDUDE_GUARDED_BY(mutex_);  // by frame
   std::vector<Group> groups_ TFDUDE_GUARDED_BY(mutex_);
-  // Samples from this instant on may be missing, until answers have told all of them.
-  std::optional<Time> missing_from_ TFDUDE_GUARDED_BY(mutex_);
-  // Of these, what was noticed after the last request.
-  std::optional<Time> missing_since_asked_ TFDUDE_GUARDED_BY(mutex_);
+  MissingSamples missing_ TFDUDE_GUARDED_BY(mutex_);
   std::optional<Time> asked_from_ TFDUDE_GUARDED_BY(mutex_);  // an answer tells what was since
   std::optional<Clock::time_point> answered_ TFDUDE_GUARDED_BY(mutex_);
 };

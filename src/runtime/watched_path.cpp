@@ -276,7 +276,8 @@ void WatchedPath::on_told_from(Time from, Clock::time_point /*now*/) {
 
 std::optional<Time> WatchedPath::lacks_from() {
   const Lock lock(mutex_);
-  const auto skipped = skipped_from();
+  WatchMirror* latest = this->latest();
+  const auto skipped = skipped_from() ? latest->ask_for_skipped() : std::nullopt;
   const auto from = lacks_history();
   if (!skipped || !from) return skipped ? skipped : from;
   return std::min(*skipped, *from);

@@ -129,6 +129,7 @@ TEST_CASE("watch mirror: an answer tells nothing of earlier samples than it has"
     Watched watched;
     WatchMirror& mirror = watched.mirror;
     CHECK(mirror.take({kTools, {sample(0, 10, 1, 4, true), sample(0, 20, 2, 4)}, 0, 9}));
+    CHECK(mirror.ask_for_skipped() == Time());
     mirror.told_from(Time());
     CHECK(mirror.take({kTools, {sample(0, 30, 3, 4)}, 10, 11}));
     CHECK(mirror.take({kTools, {sample(0, 30, 3, 4)}, 0, 11}));
@@ -314,16 +315,17 @@ TEST_CASE("watch mirror: it knows which samples an answer leaves out") {
   CHECK(mirror.skipped_from() == ms(20));
   const std::vector<PushedValue> all{sample(0, 20, 110, 1, true), sample(0, 30, 120, 1),
                                      sample(0, 40, 130, 1), sample(0, 50, 150, 1)};
+  CHECK(mirror.ask_for_skipped() == ms(20));
   CHECK(mirror.take({kTools, all, 0, 9}));
   mirror.told_from(ms(20));
   CHECK_FALSE(mirror.skipped_from());
   CHECK(mirror.lookup(at(30))->pose.translation().x() == Approx(131));
   // An edge that had no sample, and one whose history began again, lack all.
   CHECK(mirror.take({kArms, {sample(0, 50, 1, 1, true)}, 0, 6}));
-  CHECK(mirror.skipped_from() == Time());
+  CHECK(mirror.ask_for_skipped() == Time());
   mirror.told_from(Time());
   CHECK(mirror.take({kTools, {sample(0, 60, 140, 9, true)}, 0, 10}));
-  CHECK(mirror.skipped_from() == Time());
+  CHECK(mirror.ask_for_skipped() == Time());
   mirror.told_from(Time());
   // So does one that a push after a lost one began, whose stamps are earlier than those before.
   CHECK(mirror.take({kTools, {sample(0, 10, 100, 12, true)}, 11, 12}));

@@ -1,4 +1,4 @@
-// A watch of a partition beside all that its owner wrote, while messages are lost and late.
+// Watches beside all that the owner wrote, while messages are lost and late.
 
 #include <chrono>
 #include <deque>
@@ -15,6 +15,7 @@
 #include "base/loop.hpp"
 #include "partition/directory.hpp"
 #include "runtime/watched_partition.hpp"
+#include "runtime/watched_path.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/random.hpp"
@@ -60,11 +61,11 @@ class Told {
   Samples samples_;
 };
 
-// An owner that two edges move of, and a watcher; what is between them loses pushes and delays
-// answers.
+// An owner of two edges that move, and a watch of them. What is between them loses pushes and
+// delays answers.
 class Lossy {
  public:
-  explicit Lossy(Random& random) : random_(random) {
+  Lossy(Random& random, Watched& watch) : random_(random), watch_(watch) {
     REQUIRE(forest_.add("base", "", {}));
     for (const char* id : {"arm", "lamp"}) {
       REQUIRE(forest_.add(id, "base", along_x(0)));
@@ -109,13 +110,8 @@ class Lossy {
     REQUIRE(is_settled());
   }
 
-  // What was not told; empty: nothing.
-  std::string lacks() {
-    std::promise<void> all;
-    line_->post([&all] { all.set_value(); });
-    all.get_future().wait();
-    return told_.lacks(written_);
-  }
+  [[nodiscard]] const Samples& written() const { return written_; }
+  [[nodiscard]] const Forest& forest() const { return forest_; }
 
  private:
   void write() {
@@ -180,15 +176,11 @@ class Lossy {
   }
 
   Random& random_;
+  Watched& watch_;
   Forest forest_;
   Directory directory_{forest_, "arm"};
   Time time_{10s};
   Samples written_;
-  Told told_;
-  Loop loop_{"test"};
-  Callbacks callbacks_{loop_};
-  const std::shared_ptr<Callbacks::Line> line_ = callbacks_.line();
-  WatchedPartition watch_{"arm", 0, [this](const PartitionNews& news) { told_.add(news); }, line_};
   Watched::Clock::time_point now_{1h};
   std::map<std::uint64_t, WatchedGroup> groups_;
   std::deque<PushedValues> pushed_;
@@ -196,16 +188,45 @@ class Lossy {
   std::optional<Time> from_;
 };
 
+void run(Lossy& lossy) {
+  for (int i = 0; i < 60; ++i) lossy.step();
+  lossy.settle();
+}
+
 }  // namespace
 
 TEST_CASE("watched partition: each sample is told, whatever was lost before") {
-  for (int run = 0; run < 500; ++run) {
-    Random random(static_cast<std::uint64_t>(run));
+  Loop loop{"test"};
+  Callbacks callbacks{loop};
+  for (int seed = 0; seed < 500; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
     INFO("seed " << random.seed());
-    Lossy lossy(random);
-    for (int i = 0; i < 60; ++i) lossy.step();
-    lossy.settle();
-    CHECK(lossy.lacks() == "");
+    Told told;
+    const auto line = callbacks.line();
+    WatchedPartition watch(
+        "arm", 0, [&told](const PartitionNews& news) { told.add(news); }, line);
+    Lossy lossy(random, watch);
+    run(lossy);
+    std::promise<void> all;
+    line->post([&all] { all.set_value(); });
+    all.get_future().wait();
+    CHECK(told.lacks(lossy.written()) == "");
+  }
+}
+
+TEST_CASE("watched path: it has each sample, whatever was lost before") {
+  for (int seed = 0; seed < 500; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    INFO("seed " << random.seed());
+    WatchedPath watch({"arm", "lamp"}, {});
+    Lossy lossy(random, watch);
+    run(lossy);
+    for (const auto& [of, x] : lossy.written()) {
+      Query query;
+      query.at = of.second;
+      INFO(of.first << " at " << nanoseconds(of.second) / 1'000'000 << " ms");
+      CHECK(watch.lookup("base", of.first, query).value().pose.translation().x() == x);
+    }
   }
 }
 
