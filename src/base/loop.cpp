@@ -13,11 +13,10 @@
 namespace tfdude {
 namespace {
 
-// The 1st, 2nd, 4th, 8th... time of all loops.
+// All loops count together.
 void log_no_thread(const Error& error) {
   static std::atomic<std::uint64_t> times{0};
-  const std::uint64_t count = ++times;
-  if ((count & (count - 1)) == 0) log().error("{}: what it should do waits", error.message);
+  if (is_logged(++times)) log().error("{}: what it should do waits", error.message);
 }
 
 }  // namespace

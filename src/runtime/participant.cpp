@@ -114,9 +114,9 @@ Result<void> Participant::set_time(Time now, bool by_itself) {
   if (!before) return tl::unexpected(before.error());
   if (!*before) return {};
   const std::size_t cleared = structure_.forest.clear_histories(now, *before);
-  // The 1st, 2nd, 4th... only: two publishers of the time would fill the log.
+  // Two publishers of the time would fill the log.
   const std::uint64_t jumps = ++jumps_;
-  if ((jumps & (jumps - 1)) == 0) {
+  if (is_logged(jumps)) {
     // No surprise to who has set it back, and no harm where there is no history.
     const bool calm = by_itself || cleared == 0;
     log().log(calm ? spdlog::level::info : spdlog::level::warn,

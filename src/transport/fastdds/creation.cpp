@@ -77,8 +77,7 @@ Result<void> threads_to_spare() {
 
 void log_not_created(const char* consequence, const Error& error) {
   static std::atomic<std::uint64_t> times{0};
-  const std::uint64_t count = ++times;
-  if ((count & (count - 1)) == 0) log().error("{}: {}", consequence, error.message);
+  if (is_logged(++times)) log().error("{}: {}", consequence, error.message);
 }
 
 }  // namespace tfdude::fastdds
