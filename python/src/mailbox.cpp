@@ -6,6 +6,8 @@
 #include <unistd.h>
 #include <utility>
 
+#include "session.hpp"
+
 namespace tfdude::python {
 
 Mailbox::Mailbox() : fd_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
@@ -40,11 +42,13 @@ void Mailbox::end() {
 }
 
 bool Mailbox::ended() const {
+  check_usable();
   const std::lock_guard<std::mutex> lock(mutex_);
   return ended_;
 }
 
 py::list Mailbox::take() {
+  check_usable();
   std::deque<Item> items;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

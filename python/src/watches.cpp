@@ -39,6 +39,7 @@ bool wait_for_more(const Watching<Watch>& self, std::uint64_t messages, py::hand
   const Milliseconds wait = to_milliseconds(timeout, "timeout");
   const bool forever = wait == Milliseconds::max();
   const Steady::time_point end = forever ? Steady::time_point::max() : Steady::now() + wait;
+  check_usable();
   while (true) {
     const Steady::time_point slice = std::min(end, Steady::now() + kLook);
     if (without_gil([&] { return self.watch.wait_for_more(messages, slice); })) return true;
@@ -83,6 +84,7 @@ StampedTransform wait_next(Path& self, py::handle timeout) {
   const Milliseconds wait = to_milliseconds(timeout, "timeout");
   const bool forever = wait == Milliseconds::max();
   const Steady::time_point end = forever ? Steady::time_point::max() : Steady::now() + wait;
+  check_usable();
   while (true) {
     const auto left = std::chrono::ceil<Milliseconds>(end - Steady::now());
     const Milliseconds slice = std::max(std::min(left, kLook), Milliseconds(0));

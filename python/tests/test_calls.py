@@ -192,6 +192,17 @@ def test_message_filter(network, car):
 
     given = [(i, "lidar", START + i * MS) for i in (3, 1, 2, -1)]
     assert [m for m, _ in tfdude.filter_messages(car, "odom", given, in_order=True)] == [3, 1, 2]
+    # None is dropped because more are given than wait at a time.
+    for options in ({}, {"in_order": True}):
+        given = [(i, "lidar", START + i * MS) for i in range(100)]
+        assert len(list(tfdude.filter_messages(car, "odom", given, most=3, **options))) == 100
+
+    # Messages that can be had already are not counted as waiting, whether somebody gets them or not.
+    messages = tfdude.MessageFilter(car, "odom", most=2)
+    for i in range(6):
+        messages.push(i, "lidar", START + i * MS)
+        assert eventually(lambda: not messages._full())
+    assert [messages.get(timeout=20)[0] for _ in range(6)] == list(range(6))
 
     async def main():
         waiting = tfdude.MessageFilter(car, "odom", in_order=True)

@@ -117,13 +117,17 @@ def test_child_of_a_fork_gets_a_clear_error():
         warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
         watch = client.watch("base", "tool", timeout=10)
         edges = client.watch_edges(["tool"], timeout=10)
+        events = client.events()
+        messages = tfdude.MessageFilter(client, "base")
         child = os.fork()
         if child == 0:
             failures = 0
             for call in (lambda: client.lookup("base", "tool"), lambda: node.update("tool", Transform()),
                          lambda: tfdude.Client(network=network), lambda: client.stream(["tool"]),
                          watch.latest, watch.lookup, lambda: watch.messages, watch.check,
-                         lambda: edges.lookup("base", "tool"), lambda: edges.messages):
+                         lambda: edges.lookup("base", "tool"), lambda: edges.messages, watch.wait_next,
+                         lambda: watch.wait_for_more(0), events.get, lambda: events.get(1), lambda: next(iter(events)),
+                         messages.get, lambda: messages.get(1), lambda: next(iter(messages))):
                 try:
                     call()
                 except tfdude.TransformException as error:
@@ -137,7 +141,7 @@ def test_child_of_a_fork_gets_a_clear_error():
         assert status == 0, status
         client.lookup("base", "tool")  # the parent goes on
     """)
-    assert out == "10 failures"
+    assert out == "18 failures"
 
 
 def test_fork_before_use_works():

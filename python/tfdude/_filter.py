@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import collections.abc
 import select
+import threading
 import time
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -64,6 +65,7 @@ class MessageFilter(Generic[Message]):
         self._mailbox = _core._Mailbox()
         # By key, in the order in which they were pushed.
         self._waiting: collections.OrderedDict[int, _Waiting[Message]] = collections.OrderedDict()
+        self._collecting = threading.Lock()
         self._ready: collections.deque[_Waiting[Message]] = collections.deque()
         self._key = 0
         self._closed = False
@@ -72,6 +74,8 @@ class MessageFilter(Generic[Message]):
         """Passes a message on as soon as its transform is there. Does not wait."""
         if self._closed:
             raise ValueError("the filter is closed")
+        if len(self._waiting) >= self._most:
+            self._collect()
         self._key += 1
         key = self._key
         entry = _Waiting(message)
@@ -84,15 +88,21 @@ class MessageFilter(Generic[Message]):
         except BaseException:
             self._waiting.pop(key, None)
             raise
-        if len(self._waiting) > self._most:
+        with self._collecting:
+            if len(self._waiting) <= self._most:
+                return
             _, oldest = self._waiting.popitem(last=False)
             oldest.answer = _errors.make("too_much", f"more than {self._most} messages wait")
             self._done(oldest)
-            self._mailbox.wake()
+        self._mailbox.wake()
 
     def __len__(self) -> int:
         """The number of messages that wait."""
         return len(self._waiting)
+
+    def _full(self) -> bool:
+        self._collect()
+        return len(self._waiting) >= self._most
 
     def close(self) -> None:
         """Nothing more is pushed; a loop ends after what waits."""
@@ -132,19 +142,24 @@ class MessageFilter(Generic[Message]):
             entry.lookup.cancel()
         self._ready.append(entry)
 
-    def _next(self) -> tuple[Message, _core.StampedTransform] | None:
-        for key, answer in self._mailbox.take():
-            entry = self._waiting.get(key)
-            if entry is None:
-                continue  # displaced
-            entry.answer = answer
-            if not self._in_order:
+    def _collect(self) -> None:
+        """Takes what was answered. The threads that push and that get may both do so."""
+        with self._collecting:
+            for key, answer in self._mailbox.take():
+                entry = self._waiting.get(key)
+                if entry is None:
+                    continue  # displaced
+                entry.answer = answer
+                if not self._in_order:
+                    self._done(self._waiting.pop(key))
+            while self._in_order and self._waiting:
+                key, entry = next(iter(self._waiting.items()))
+                if entry.answer is None:
+                    break
                 self._done(self._waiting.pop(key))
-        while self._in_order and self._waiting:
-            key, entry = next(iter(self._waiting.items()))
-            if entry.answer is None:
-                break
-            self._done(self._waiting.pop(key))
+
+    def _next(self) -> tuple[Message, _core.StampedTransform] | None:
+        self._collect()
         while self._ready:
             entry = self._ready.popleft()
             if isinstance(entry.answer, _core.StampedTransform):
@@ -164,10 +179,13 @@ def filter_messages(
     """Yields (message, transform) for each (message, frame, stamp) of an iterable, as soon as it can be had.
 
     Messages are taken from the iterable one by one, and those that are ready are yielded in between; at its end, all
-    that still wait. options: as of MessageFilter.
+    that still wait. While as many as `most` wait, no further one is taken. options: as of MessageFilter.
     """
     waiting: MessageFilter[Message] = MessageFilter(client, target, **options)
     for message, frame, stamp in messages:
+        while waiting._full():
+            if (found := waiting.get(timeout=0.1)) is not None:
+                yield found
         waiting.push(message, frame, stamp)
         while (found := waiting.get(timeout=0)) is not None:
             yield found

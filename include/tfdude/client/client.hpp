@@ -402,9 +402,9 @@ class TFDUDE_EXPORT Client {
     return publish_clock(stamp_of(now));
   }
 
-  /// As publish_clock(), acknowledged: returns when the clocks of all reachable owners show the
-  /// time, for simulations in lock-step. Other clients are not waited for. One round trip, if
-  /// nothing is lost. Nobody else may publish the time.
+  /// As publish_clock(), acknowledged: returns when the clocks of all reachable owners that have an
+  /// external clock show the time, for simulations in lock-step. Others, and clients, are not
+  /// waited for. One round trip, if nothing is lost. Nobody else may publish the time.
   /// @return kInvalidInput, kNotPermitted, kTransport as publish_clock(); kTimeout: not within
   ///   `wait`, naming an owner; kUnsupported: an owner of protocol 1.0
   [[nodiscard]] Result<void> advance_to(ExternalTime time, Milliseconds wait);
