@@ -25,6 +25,35 @@ FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
   return frame;
 }
 
+// Of an edge whose joint says its value anew: what was observed before has the same error.
+StoredCorrelation with_unknown(const StoredCorrelation& stored) {
+  StoredCorrelation correlation{stored.said, Correlation(), {}};
+  correlation.observed->unknown = true;
+  return correlation;
+}
+
+// Of these frames, what was stored of those that were observed, and are where their joints were.
+std::vector<const StoredFrame*> observed_joints(const StoredState& state,
+                                                const std::vector<FrameSpec>& frames,
+                                                const std::vector<StoredJoint>& joints) {
+  const auto all = by_id(frames);
+  std::vector<const StoredFrame*> observed;
+  for (const StoredFrame& frame : state.frames) {
+    const auto found = all.find(frame.id);
+    if (!frame.correlation.observed || found == all.end() || !found->second->joint) continue;
+    if (left_of(*found->second->joint, joints)) observed.push_back(&frame);
+  }
+  return observed;
+}
+
+// Whether the joint says the pose that it said before the edge was observed.
+bool says_as_before(const StoredFrame& frame, const Pose& said) {
+  constexpr double kRounding = 1e-9;
+  const auto& given = frame.correlation.given;
+  return given && (given->matrix() - said.matrix()).cwiseAbs().maxCoeff() <=
+                      kRounding * (1 + said.translation().norm());
+}
+
 // The stored frames. Frames moved by joints are at the joints' stored positions, computed from the
 // current descriptions.
 // @param joints  those of the state whose positions are still valid
@@ -37,10 +66,15 @@ std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<S
     if (known == described.end() || !known->second->joint) continue;
     if (known->second->parent != frame.parent) continue;
     if (!left_of(*known->second->joint, state.joints)) continue;
-    frame.X_PC = value_of(as_left(*known->second, joints));
-    frame.correlation.observed.reset();
-    // Its initial position is no sample.
-    if (!left_of(*known->second->joint, joints)) frame.time = {};
+    const Transform X_PC = value_of(as_left(*known->second, joints));
+    if (!left_of(*known->second->joint, joints)) {
+      frame.time = {};  // its initial position is no sample
+      frame.correlation.observed.reset();
+    } else if (frame.correlation.observed) {
+      if (says_as_before(frame, X_PC.pose)) continue;
+      frame.correlation = with_unknown(frame.correlation);
+    }
+    frame.X_PC = X_PC;
   }
   return frames;
 }
@@ -147,6 +181,9 @@ Result<void> Partition::reconfigure(const StoredState& state,
     }
   }
   if (auto taken = take(fresh, directory_.next_lamport_time(now)); !taken) return taken;
+  for (const StoredFrame* frame : observed_joints(state, fresh, joints)) {
+    (void)forest_.resume(frame->id, with_unknown(frame->correlation), {});
+  }
   for (const std::string& id : dropped) tell_dropped(id);
   return {};
 }

@@ -14,6 +14,7 @@
 #include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
+#include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/observed_chain.hpp"
 #include "support/process.hpp"
@@ -158,6 +159,102 @@ TEST_CASE("kept: a correlation set by request survives a restart and can be remo
   robot.restart("b", false);
   REQUIRE(eventually([&] { return robot.client->lookup(frame(1), frame(4)).has_value(); }));
   CHECK_FALSE(bound());
+}
+
+namespace {
+
+// An arm that a joint moves, and a mount on it that another owner has. Both are of one axis in
+// effect: the joint turns about z, and the mount is turned about it, too.
+struct JointedArm {
+  explicit JointedArm(const Join& join) : join_(join) {
+    start();
+    StatedCovariance mounted(*Covariance::from_stddev({0.01, 0.01, 0.01, 0.01, 0.01, 0.1}));
+    FrameSpec mount{"mount", "arm", {Pose(), mounted}};
+    camera.emplace(Node::open(join("camera"), "camera", {mount}).value());
+  }
+  // @param origin  of the joint, along x, beyond what is described at first
+  // @param up  of its axis
+  void start(double origin = 0, double up = 1) {
+    node_.reset();
+    NodeOptions options;
+    options.state = directory_.path();
+    JointSpec joint = testing::revolute_named("turn");
+    joint.joint = revolute_joint(testing::along_x(1 + origin), {0, 0, up});
+    const std::vector<FrameSpec> frames{{"world", "", {}},
+                                        testing::moved_by("arm", "world", joint)};
+    node_.emplace(Node::open(join_("arm"), "arm", frames, options).value());
+  }
+  void move(double position) {
+    REQUIRE(eventually([&] {
+      return camera->update_joints({{"turn", position, 1e-4}}, stamp).has_value();
+    }));
+  }
+  void observe() {
+    const Transform seen{X("world", "mount").pose,
+                         *Covariance::from_stddev({1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3})};
+    REQUIRE(camera->observe("world", "mount", seen, stamp, {1.0, true}));
+  }
+  StampedTransform X(const char* a, const char* b) {
+    std::optional<StampedTransform> found;
+    REQUIRE(eventually([&] {
+      Query query;
+      query.at = stamp;
+      const auto one = camera->lookup(a, b, query);
+      if (one) found = *one;
+      return one.has_value();
+    }));
+    return *found;
+  }
+  // The variance of the rotation about z [rad²].
+  double variance(const char* a, const char* b) {
+    return X(a, b).covariance.of_specified().matrix()(5, 5);
+  }
+
+  const Time stamp{std::chrono::seconds(1'000'000'000)};
+  std::optional<Node> camera;
+
+ private:
+  const Join join_;
+  TemporaryDirectory directory_;
+  std::optional<Node> node_;
+};
+
+}  // namespace
+
+// Its joint's position is stored, and what an observation has made of it.
+TEST_CASE("kept: what was observed over a joint counts once, however often its owner restarts") {
+  JointedArm arm(testing::join_loopback());
+  arm.move(0.4);
+  for (int i = 1; i <= 5; ++i) {
+    arm.observe();
+    // The scalar filter of the joint's angle and the mount's.
+    const double seen = 1e-6 / i;
+    const double sum = 1 / (1 / (1e-4 + 1e-2) + 1 / seen);
+    const auto posterior = [](double own, double rest, double whole) {
+      return own * rest / (own + rest) + own * own / ((own + rest) * (own + rest)) * whole;
+    };
+    CHECK(arm.variance("world", "mount") == testing::Approx(sum).epsilon(1e-3));
+    CHECK(arm.variance("arm", "mount") ==
+          testing::Approx(posterior(1e-2, 1e-4, sum)).epsilon(1e-3));
+    CHECK(arm.variance("world", "arm") ==
+          testing::Approx(posterior(1e-4, 1e-2, sum)).epsilon(1e-3));
+    arm.start();
+  }
+  SECTION("the joint's next value is new") {
+    arm.move(0.5);
+    CHECK(arm.variance("world", "arm") == testing::Approx(1e-4).epsilon(1e-3));
+  }
+  SECTION("a joint that is described otherwise says nothing that is independent") {
+    const bool is_turned = GENERATE(false, true);
+    arm.start(is_turned ? 0 : 0.01, is_turned ? -1 : 1);
+    CHECK(arm.variance("world", "arm") == testing::Approx(1e-4).epsilon(1e-3));
+    CHECK(arm.X("world", "mount").basis.bound);
+    const double before = arm.variance("arm", "mount");
+    arm.observe();
+    CHECK(arm.variance("arm", "mount") >= 0.9 * before);
+    arm.move(0.5);
+    CHECK_FALSE(arm.X("world", "arm").basis.bound);
+  }
 }
 
 TEST_CASE("kept: an invalid correlation of another owner's edge is rejected") {
