@@ -64,7 +64,11 @@ Loading compressed(const Loading& root) {
 
 Loading root_of_difference(const Loading& C, const Loading& D) {
   if (D.cols() == 0) return compressed(C);
-  const Factor whole(C);
+  // Both come from many operations. Below that, a direction of C is none, and D's part in it would
+  // be taken for one in which nothing is left.
+  constexpr double kLost = 1e-12;
+  const Twist sizes = (C.rowwise().squaredNorm() + D.rowwise().squaredNorm()).cwiseSqrt();
+  const Factor whole(C, kLost * sizes);
   // Nothing is left of nothing; the eigenvalues of a matrix without rows are not defined.
   if (whole.rank() == 0) return Loading(6, 0);
   const Eigen::MatrixXd taken = whole.whitening() * D;
