@@ -11,6 +11,7 @@
 
 #include "math/minimum.hpp"
 #include "math/square_root.hpp"
+#include "math/unknown_rotation.hpp"
 
 namespace tfdude {
 namespace {
@@ -26,7 +27,8 @@ struct Gaussian {
 
 // The information of an estimate about δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ
 // has mean zero, and Jr(e) e = e.
-Gaussian seen_from(const Pose& X, const Transform& estimate) {
+Gaussian seen_from(const Pose& X, const Transform& stated) {
+  const Transform estimate = with_unknown_rotation_of(X, stated);
   const Twist e = log(estimate.pose.inverse() * X);
   return {-e, right_jacobian(e) * root_of(estimate.covariance.of_specified().matrix())};
 }

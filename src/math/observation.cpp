@@ -20,6 +20,7 @@
 #include "math/path_minimum.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
+#include "math/unknown_rotation.hpp"
 
 namespace tfdude {
 namespace {
@@ -34,18 +35,24 @@ class Update {
   Update(const std::vector<ObservedEdge>& edges, const Transform& Z_AB, const std::string& source,
          const ObserveOptions& options, bool merge)
       : all_(edges),
-        Z_AB_(Z_AB),
+        Z_AB_(Z_AB.pose),
         source_(source),
         options_(options),
         prior_(edges),
         R_(Z_AB.covariance.of_specified()),
+        unknown_rotations_(tfdude::unknown_rotations(R_)),
         independent_(options.independent),
         merge_(merge) {}
 
   Result<Observation> run() {
+    turn_to(at_start().X_AB);
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
     // Parts that may be correlated are judged by their bound.
-    PathMinimum found = independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
+    PathMinimum found = first_minimum();
+    for (int i = 1; i < kMostTurns && turns(found); ++i) {
+      turn_to(found.linear.X_AB);
+      found = first_minimum();
+    }
     Observation observation;
     judge(found, observation);
     for (const ObservedEdge& edge : all_)
@@ -68,6 +75,27 @@ class Update {
   }
 
  private:
+  // As often as the rotation of the path may be found anew, about axes of which the measurement
+  // says nothing.
+  static constexpr int kMostTurns = 5;
+
+  [[nodiscard]] PathMinimum first_minimum() const {
+    return independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
+  }
+  void turn_to(const Pose& X_AB) {
+    if (unknown_rotations_ == 0) return;
+    const Transform turned = with_unknown_rotation_of(X_AB, {Z_AB_, R_});
+    Z_AB_ = turned.pose;
+    R_ = turned.covariance.of_specified();
+  }
+  // Whether the path has turned about them since.
+  [[nodiscard]] bool turns(const PathMinimum& found) const {
+    constexpr double kEnough = 1e-3;  // [rad]
+    if (unknown_rotations_ == 0 || !found.converged) return false;
+    const Pose& turned = with_unknown_rotation_of(found.linear.X_AB, {Z_AB_, R_}).pose;
+    return turned.rotation().angularDistance(Z_AB_.rotation()) > kEnough;
+  }
+
   // Parts of unknown correlation count as measurement error, unless nothing else can be corrected.
   Result<void> count_unknown() {
     std::vector<std::size_t> unknown;
@@ -96,7 +124,7 @@ class Update {
   }
 
   [[nodiscard]] LinearPath at_start() const {
-    return linearize(all_, std::vector<Twist>(all_.size(), Twist::Zero()), Z_AB_.pose);
+    return linearize(all_, std::vector<Twist>(all_.size(), Twist::Zero()), Z_AB_);
   }
 
   // The covariance of the path as the edges have it.
@@ -109,7 +137,7 @@ class Update {
   [[nodiscard]] PathMinimum minimum(const BoundWeights& weights) const {
     JointPrior prior = prior_;
     prior.widen(weights.of_A);
-    return minimize(all_, prior, Z_AB_.pose, noise(weights));
+    return minimize(all_, prior, Z_AB_, noise(weights));
   }
   [[nodiscard]] Loading noise(const BoundWeights& weights) const {
     return std::sqrt(weights.of_B) * root_of(R_.matrix());
@@ -118,7 +146,7 @@ class Update {
   // By the cost at the minimum. That at the estimate is larger if the path is curved.
   void judge(const PathMinimum& found, Observation& observation) const {
     const bool impossible = !found.is_possible();
-    observation.dimensions = found.S.rank();
+    observation.dimensions = std::max(found.S.rank() - unknown_rotations_, 0);
     observation.distance_squared =
         impossible ? std::numeric_limits<double>::infinity() : found.cost();
     const bool gated = options_.gate < 1 && observation.dimensions > 0;
@@ -189,11 +217,12 @@ class Update {
   }
 
   const std::vector<ObservedEdge>& all_;
-  const Transform& Z_AB_;
+  Pose Z_AB_;
   const std::string& source_;
   const ObserveOptions& options_;
   JointPrior prior_;
   Covariance R_;
+  const int unknown_rotations_;  // axes
   bool independent_;
   const bool merge_;  // the sources of earlier observations
 };

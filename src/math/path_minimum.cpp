@@ -177,7 +177,8 @@ class Descent {
 
 LinearPath linearize(const std::vector<ObservedEdge>& edges, const std::vector<Twist>& xi,
                      const Pose& Z_AB) {
-  LinearPath linear{Twist::Zero(), std::vector<Matrix6d>(edges.size()), Z_AB.translation().norm()};
+  LinearPath linear{
+      Twist::Zero(), std::vector<Matrix6d>(edges.size()), Z_AB.translation().norm(), {}};
   Pose X_FB;  // F: the frame reached, starting from the end of the path
   for (std::size_t k = edges.size(); k-- > 0;) {
     linear.H[k].setZero();
@@ -189,6 +190,7 @@ LinearPath linearize(const std::vector<ObservedEdge>& edges, const std::vector<T
     X_FB = up ? X_CB : X_PC * X_CB;
     linear.reach += X_PC.translation().norm();
   }
+  linear.X_AB = X_FB;
   linear.h = log(Z_AB.inverse() * X_FB);
   const Matrix6d outer = right_jacobian(linear.h).inverse();
   for (Matrix6d& H : linear.H) H = (outer * H).eval();

@@ -13,6 +13,7 @@ struct LinearPath {
   Twist h = Twist::Zero();
   std::vector<Matrix6d> H;  ///< by each edge's ξ; zero for an edge beside the path
   double reach = 0;         ///< how large the coordinates are from which h was computed [m]
+  Pose X_AB;                ///< at ξ
 };
 [[nodiscard]] LinearPath linearize(const std::vector<ObservedEdge>& edges,
                                    const std::vector<Twist>& xi, const Pose& Z_AB);
