@@ -50,6 +50,9 @@ class Descent {
       : all_(edges), prior_(prior), Z_AB_(Z_AB), R_(R) {}
 
   PathMinimum run() {
+    if (prior_.is_tied()) {
+      if (auto found = with_first_derivatives()) return *std::move(found);
+    }
     start();
     const PathMinimum at_start = here();
     path_ = prior_.path(linear_.H);
@@ -67,6 +70,28 @@ class Descent {
 
  private:
   enum class Step { kMore, kLast, kStuck };
+
+  // An earlier observation has tied the errors of edges as its derivatives say. The minimum follows
+  // the bend of the path along what was never measured, and would take that for information. So the
+  // derivatives stay those of the estimate, as in a filter with first-estimates Jacobians (Huang,
+  // Mourikis & Roumeliotis 2010), and only what the measurement shows is found anew.
+  std::optional<PathMinimum> with_first_derivatives() {
+    constexpr int kMostSteps = 30;
+    start();
+    const std::vector<Matrix6d> H = linear_.H;
+    PathMinimum now = here();
+    for (int i = 0; i < kMostSteps; ++i) {
+      EdgeErrors next = best(now);
+      const bool converged = is_small(next);
+      at_ = std::move(next);
+      linear_ = linearize(all_, at_.xi, Z_AB_);
+      linear_.H = H;
+      now = here();
+      now.converged = converged;
+      if (converged) return now;
+    }
+    return std::nullopt;
+  }
 
   void start() {
     linear_ = linearize(all_, std::vector<Twist>(all_.size(), Twist::Zero()), Z_AB_);

@@ -167,6 +167,45 @@ TEST_CASE("Columns that are dropped make the joint covariance larger and never s
   CHECK((chain.dense() - P).cwiseAbs().maxCoeff() > 1e-6 * P.cwiseAbs().maxCoeff());
 }
 
+// What a path has in common is that of its derivatives where it was observed. Each observation moves
+// it a little, and that must not be taken for information about what was never measured.
+TEST_CASE("A bent path that is observed again says no more about its edges") {
+  const auto stddev = [](double metres, double radians) {
+    return *Covariance::from_stddev({metres, metres, metres, radians, radians, radians});
+  };
+  std::vector<ObservedEdge> edges;
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {1, 0, 0}}) {
+    edges.push_back(
+        {{Pose::trusted(Eigen::Quaterniond::Identity(), at), stddev(0.01, 0.05), {}, {}}});
+  }
+  const Pose Z_AB = edges[0].X_PC.pose * edges[1].X_PC.pose * edges[2].X_PC.pose;
+  Twist noise;
+  noise << 1, -1, 1, 1, -1, 1;
+  Matrix6d first;
+  int count = 0;
+  for (const double deviations : {0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0}) {
+    const Transform Z{Z_AB * exp(Twist(1e-4 * deviations * noise)), stddev(1e-4, 1e-4)};
+    const auto found = observe(edges, Z, kSource, {});
+    REQUIRE(found);
+    CHECK(found->accepted);
+    ++count;
+    Belief path;
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      const Twist moved = log(edges[k].X_PC.pose.inverse() * found->edges[k].X_PC.pose);
+      CHECK(moved.cwiseAbs().maxCoeff() < 1e-3);
+      edges[k].X_PC = found->edges[k].X_PC;
+      path = compose(path, edges[k].X_PC, Order::kSecond);
+    }
+    const Matrix6d edge = collapse({{}, edges[0].X_PC.own, {}, edges[0].X_PC.common_errors})
+                              .covariance.of_specified()
+                              .matrix();
+    if (count == 1) first = edge;
+    CHECK((edge - first).norm() < 1e-2 * first.norm());
+    const Matrix6d whole = collapse(path).covariance.of_specified().matrix();
+    CHECK(std::sqrt(whole(0, 0)) == testing::Approx(1e-4 / std::sqrt(count)).epsilon(0.02));
+  }
+}
+
 TEST_CASE("A measurement of one uncertain edge is fused with it") {
   Random random(634);
   INFO("seed " << random.seed());
