@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <map>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -9,6 +7,7 @@
 #include "../../rendering/json.hpp"
 #include "../commands.hpp"
 #include "../frame_formats.hpp"
+#include "../importing.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -73,7 +72,7 @@ struct Import final : LiveCommand {
   int ask(Client& client, const Common& common) const override {
     const auto frames = read(common);
     if (!frames) return report(frames.error(), common);
-    const auto done = apply(client, *frames);
+    const auto done = import_frames(client, partition, *frames);
     if (!done) return report_cause(client, done.error(), common);
     return answer(common,
                   {{"done", "imported"}, {"partition", partition}, {"frames", json_of(*frames)}},
@@ -98,69 +97,6 @@ struct Import final : LiveCommand {
     if (!given) return tl::unexpected(given.error());
     read.covariance = given->covariance;
     return load_frames(read);
-  }
-
-  // First all that can be known to fail, then the structure, then all values in one commit. Until
-  // then new edges are unspecified, so nobody sees an own part without the common errors.
-  [[nodiscard]] Result<void> apply(Client& client, const std::vector<FrameSpec>& frames) const {
-    const auto all = client.frames();
-    if (!all) return tl::unexpected(all.error());
-    std::map<std::string, const Frame*> known;
-    for (const Frame& frame : *all) known[frame.id] = &frame;
-    if (auto ok = check(frames, known); !ok) return ok;
-    std::vector<EdgeUpdate> values;
-    for (const FrameSpec& frame : frames) {
-      const Transform unspecified{frame.X_PC.pose, {}};
-      const auto found = known.find(frame.id);
-      Result<void> done;
-      if (known.count(frame.parent) == 0) {
-        done = client.add(frame.parent, "", Transform::exact({}), partition);
-        known[frame.parent] = nullptr;
-      }
-      if (done && found == known.end()) {
-        done = client.add(frame.id, frame.parent, unspecified, partition);
-        known[frame.id] = nullptr;
-      } else if (done && found->second->parent != frame.parent) {
-        done = client.move(frame.id, frame.parent, unspecified);
-      }
-      const bool correlated = !frame.correlation.empty() || found != known.end();
-      if (done && correlated) done = client.correlate(frame.id, frame.correlation);
-      if (!done) return fail_at("frame " + quote(frame.id), done.error());
-      values.push_back({frame.id, frame.X_PC});
-    }
-    constexpr std::size_t kAtOnce = 4096;  // what an owner accepts
-    for (std::size_t first = 0; first < values.size(); first += kAtOnce) {
-      const std::size_t end = std::min(first + kAtOnce, values.size());
-      const auto at = [&](std::size_t i) {
-        return values.begin() + static_cast<std::ptrdiff_t>(i);
-      };
-      auto done = client.update(std::vector<EdgeUpdate>(at(first), at(end)));
-      if (!done) return done;
-    }
-    return {};
-  }
-
-  // Frames of other partitions stay theirs, and no frame may come below itself.
-  [[nodiscard]] Result<void> check(const std::vector<FrameSpec>& frames,
-                                   const std::map<std::string, const Frame*>& known) const {
-    std::map<std::string, std::string> parents;
-    for (const auto& [id, frame] : known) parents[id] = frame->parent;
-    for (const FrameSpec& frame : frames) {
-      parents[frame.id] = frame.parent;
-      const auto found = known.find(frame.id);
-      if (found == known.end() || found->second->partition == partition) continue;
-      return fail(Errc::kAlreadyExists, "frame " + quote(frame.id) + " belongs to partition " +
-                                            quote(found->second->partition));
-    }
-    for (const FrameSpec& frame : frames) {
-      std::size_t steps = 0;
-      for (auto at = parents.find(frame.id); at != parents.end(); at = parents.find(at->second)) {
-        if (++steps <= parents.size()) continue;
-        return fail(Errc::kCycle, "frame " + quote(frame.id) + ": its new parent " +
-                                      quote(frame.parent) + " lies below it");
-      }
-    }
-    return {};
   }
 
   FrameFile file;
