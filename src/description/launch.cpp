@@ -2,6 +2,7 @@
 // in shell scripts.
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "description/file_text.hpp"
 #include "description/launch_starts.hpp"
 #include "description/python_tokens.hpp"
+#include "description/shell_text.hpp"
 #include "description/xml_text.hpp"
 #include "types/ros_rules.hpp"
 
@@ -152,6 +154,16 @@ Result<bool> holds(const XMLElement& element, const std::string& name) {
   return true;
 }
 
+// Whether its conditions hold, and those of all that it is in.
+Result<bool> all_hold(const XMLElement& element, const std::string& name) {
+  Result<bool> happens = true;
+  for (const auto* outer = &element; happens && *happens && outer != nullptr;) {
+    happens = holds(*outer, name);
+    outer = outer->Parent() == nullptr ? nullptr : outer->Parent()->ToElement();
+  }
+  return happens;
+}
+
 bool is_value(const char* attribute, const char* value) {
   return attribute != nullptr && std::strcmp(attribute, value) == 0;
 }
@@ -160,17 +172,24 @@ bool is_value(const char* attribute, const char* value) {
 class StartSearch final : public tinyxml2::XMLVisitor {
  public:
   [[nodiscard]] const std::vector<const XMLElement*>& found() const { return found_; }
+  // Those that name the program where only the launch system could tell its start.
+  [[nodiscard]] const std::vector<const XMLElement*>& unread() const { return unread_; }
 
   bool VisitEnter(const XMLElement& element, const tinyxml2::XMLAttribute* /*first*/) override {
     const bool node = std::strcmp(element.Name(), "node") == 0;
     const bool named = is_value(element.Attribute("type"), kProgram) ||
                        is_value(element.Attribute("exec"), kProgram);
     if (node && named) found_.push_back(&element);
+    for (const char* attribute : {"cmd", "default", "value", "launch-prefix"}) {
+      const char* said = element.Attribute(attribute);
+      if (said != nullptr && mentions_publisher(said)) unread_.push_back(&element);
+    }
     return true;
   }
 
  private:
   std::vector<const XMLElement*> found_;
+  std::vector<const XMLElement*> unread_;
 };
 
 Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::string& name) {
@@ -179,24 +198,27 @@ Result<std::vector<Start>> starts_in_xml(const std::string& text, const std::str
   if (!root) return tl::unexpected(root.error());
   StartSearch search;
   if (*root != nullptr) (*root)->Accept(&search);
+  for (const XMLElement* element : search.unread()) {
+    const auto happens = all_hold(*element, name);
+    if (happens && !*happens) continue;
+    return file_error(Errc::kInvalidInput, name, element->GetLineNum(), unread_start());
+  }
   std::vector<Start> starts;
   for (const XMLElement* node : search.found()) {
-    Result<bool> happens = true;
-    for (const auto* outer = node; happens && *happens && outer != nullptr;) {
-      happens = holds(*outer, name);
-      outer = outer->Parent() == nullptr ? nullptr : outer->Parent()->ToElement();
-    }
+    auto happens = all_hold(*node, name);
     if (!happens) return tl::unexpected(std::move(happens.error()));
     if (!*happens) continue;
     const char* arguments = node->Attribute("args");
-    starts.push_back({launch_words(arguments == nullptr ? "" : arguments),
-                      is_value(node->Attribute("pkg"), "tf"), node->GetLineNum()});
+    auto words = launch_words(arguments == nullptr ? "" : arguments, name, node->GetLineNum());
+    if (!words) return tl::unexpected(std::move(words.error()));
+    starts.push_back(
+        {*std::move(words), is_value(node->Attribute("pkg"), "tf"), node->GetLineNum()});
   }
   return starts;
 }
 
 Result<std::vector<Start>> starts_in_python(const std::string& text, const std::string& name) {
-  auto calls = python_arguments(text, kProgram, name);
+  auto calls = python_arguments(text, name);
   if (!calls) return tl::unexpected(std::move(calls.error()));
   std::vector<Start> starts;
   for (PythonArguments& call : *calls) starts.push_back({std::move(call.words), false, call.line});
@@ -222,11 +244,40 @@ Result<std::vector<Start>> starts_of(const std::string& text, const std::string&
 
 }  // namespace
 
-std::vector<std::string> launch_words(std::string_view text) {
+bool is_publisher(std::string_view word) {
+  const std::string_view program = kStaticPublisher;
+  if (word.size() < program.size()) return false;
+  const auto begin = word.size() - program.size();
+  return word.substr(begin) == program && (begin == 0 || word[begin - 1] == '/');
+}
+
+bool mentions_publisher(std::string_view text) {
+  const std::string_view program = kStaticPublisher;
+  const auto goes_on = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.';
+  };
+  for (auto at = text.find(program); at != std::string_view::npos; at = text.find(program, at)) {
+    const bool begins = at == 0 || !goes_on(text[at - 1]);
+    at += program.size();
+    if (begins && (at == text.size() || !goes_on(text[at]))) return true;
+  }
+  return false;
+}
+
+std::string unread_start() {
+  return std::string(kStaticPublisher) +
+         " is started here in a way that is not read: start it as a node, with its arguments";
+}
+
+Result<std::vector<std::string>> launch_words(std::string_view text, const std::string& file,
+                                              int line) {
+  ShellText rest(text, file, line, ShellRules::kShlex);
   Words words;
-  std::string line(text);
-  std::replace(line.begin(), line.end(), '\n', ' ');
-  for (const std::string_view word : words_of(line)) words.emplace_back(word);
+  while (rest.skip_blanks()) {
+    ShellWord word;
+    if (auto ok = rest.word(word); !ok) return tl::unexpected(std::move(ok.error()));
+    words.push_back(std::move(word.text));
+  }
   return words;
 }
 

@@ -8,14 +8,10 @@
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
 #include "description/launch_starts.hpp"
+#include "description/shell_text.hpp"
 
 namespace tfdude {
 namespace {
-
-struct ShellWord {
-  std::string text;          // without its quotes
-  bool is_expanded = false;  // the shell replaces a part of it
-};
 
 // A simple command: without its redirections, and up to what divides it from the next.
 struct ShellCommand {
@@ -24,33 +20,10 @@ struct ShellCommand {
   int mention = 0;  // the line of a here-document that names the program; 0: none
 };
 
-bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-bool is_program(std::string_view word) {
-  const std::string_view program = kStaticPublisher;
-  if (word.size() < program.size()) return false;
-  const auto begin = word.size() - program.size();
-  return word.substr(begin) == program && (begin == 0 || word[begin - 1] == '/');
-}
-
-// Whether a text of several words has that of the program.
-bool mentions(std::string_view text) {
-  if (text.find(kStaticPublisher) == std::string_view::npos) return false;
-  const auto has_program = [](std::string_view line) {
-    const auto words = words_of(line);
-    return std::any_of(words.begin(), words.end(), is_program);
-  };
-  TextLines lines(text);
-  while (lines.next()) {
-    if (has_program(lines.line())) return true;
-  }
-  return false;
-}
-
-// Reads each character once or twice, and does not call itself, so that no input takes the stack.
-class ShellCommands {
+class ShellCommands : private ShellText {
  public:
-  ShellCommands(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+  ShellCommands(std::string_view text, const std::string& file)
+      : ShellText(text, file, 1, ShellRules::kShell) {}
 
   [[nodiscard]] Result<std::vector<ShellCommand>> all() {
     while (at_ < text_.size()) {
@@ -94,25 +67,6 @@ class ShellCommands {
     std::size_t command = 0;  // whose input it is
   };
 
-  [[nodiscard]] static bool is_one_of(char c, std::string_view characters) {
-    return characters.find(c) != std::string_view::npos;
-  }
-  [[nodiscard]] char here(std::size_t ahead = 0) const {
-    return at_ + ahead < text_.size() ? text_[at_ + ahead] : '\n';
-  }
-  [[nodiscard]] tl::unexpected<Error> error(int line, const std::string& what) const {
-    return file_error(Errc::kConfig, file_, line, what + " has no end");
-  }
-
-  // A backslash at the end of a line.
-  [[nodiscard]] bool joins_lines() const {
-    return here() == '\\' && here(here(1) == '\r' ? 2 : 1) == '\n';
-  }
-  void join_lines() {
-    at_ += here(1) == '\r' ? 3U : 2U;
-    ++line_;
-  }
-
   // Its "<<" is no here-document.
   void skip_arithmetic() {
     const std::size_t end = std::min(text_.find("))", at_), text_.size());
@@ -145,7 +99,7 @@ class ShellCommands {
         if (document.is_indented) line.remove_prefix(std::min(tabs, line.size()));
         is_ended = line == document.end;
         ShellCommand& command = commands_[document.command];
-        if (command.mention == 0 && mentions(line)) command.mention = line_;
+        if (command.mention == 0 && mentions_publisher(line)) command.mention = line_;
         at_ = end + 1;
         ++line_;
       }
@@ -181,102 +135,12 @@ class ShellCommands {
     const auto signs = std::count(sign.begin(), sign.end(), '<');
     if (signs == 2) {
       documents_.push_back({target.text, sign.back() == '-', line, commands_.size()});
-    } else if (signs == 3 && mentions(target.text)) {
+    } else if (signs == 3 && mentions_publisher(target.text)) {
       command_.mention = line;
     }
     return {};
   }
 
-  [[nodiscard]] Result<void> word(ShellWord& word) {
-    while (!is_blank(here()) && !is_one_of(here(), "\n;&|()<>")) {
-      Result<void> ok;
-      if (joins_lines()) {
-        join_lines();
-      } else if (here() == '\\') {
-        word.text += here(1);
-        at_ += 2;
-      } else if (here() == '\'') {
-        ok = quoted(word);
-      } else if (here() == '"') {
-        ok = doubly_quoted(word);
-      } else {
-        ok = plain(word);
-      }
-      if (!ok) return ok;
-    }
-    return {};
-  }
-
-  void take(ShellWord& word) {
-    if (here() == '\n') ++line_;
-    word.text += text_[at_++];
-  }
-
-  [[nodiscard]] Result<void> quoted(ShellWord& word) {
-    const int line = line_;
-    for (++at_; here_is_inside('\'');) take(word);
-    if (at_ >= text_.size()) return error(line, "a quote");
-    ++at_;
-    return {};
-  }
-
-  [[nodiscard]] Result<void> doubly_quoted(ShellWord& word) {
-    const int line = line_;
-    for (++at_; here_is_inside('"');) {
-      if (joins_lines()) {
-        join_lines();
-        continue;
-      }
-      if (here() == '\\' && is_one_of(here(1), "$`\"\\")) {
-        ++at_;
-        take(word);
-      } else if (auto ok = plain(word); !ok) {
-        return ok;
-      }
-    }
-    if (at_ >= text_.size()) return error(line, "a quote");
-    ++at_;
-    return {};
-  }
-
-  [[nodiscard]] bool here_is_inside(char quote) const {
-    return at_ < text_.size() && text_[at_] != quote;
-  }
-
-  // A character that is no quote, or what the shell replaces.
-  [[nodiscard]] Result<void> plain(ShellWord& word) {
-    const int line = line_;
-    if (here() == '`') {
-      word.is_expanded = true;
-      do take(word);
-      while (here_is_inside('`'));
-      if (at_ >= text_.size()) return error(line, "a substitution");
-    } else if (here() == '$') {
-      word.is_expanded = true;
-      if (here(1) == '(') return substitution(word);
-    }
-    take(word);
-    return {};
-  }
-
-  // $(command), or $((expression)).
-  [[nodiscard]] Result<void> substitution(ShellWord& word) {
-    const int line = line_;
-    std::size_t open = 0;
-    do {
-      take(word);
-      if (at_ >= text_.size()) return error(line, "a substitution");
-      if (here() == '(') ++open;
-      if (here() == ')') --open;
-    } while (open > 0);
-    take(word);
-    return {};
-  }
-
-  std::string_view text_;
-  const std::string& file_;
-  std::size_t at_ = 0;
-  int line_ = 1;
   ShellCommand command_;
   std::vector<ShellCommand> commands_;
   std::vector<HereDocument> documents_;
@@ -325,8 +189,8 @@ Result<std::vector<LaunchStart>> starts_in_shell(const std::string& text, const 
     int mention = command.mention;
     auto program = command.words.end();
     for (auto word = command.words.begin(); word != command.words.end(); ++word) {
-      if (program == command.words.end() && is_program(word->text)) program = word;
-      const bool is_text = !is_program(word->text) && mentions(word->text);
+      if (program == command.words.end() && is_publisher(word->text)) program = word;
+      const bool is_text = !is_publisher(word->text) && mentions_publisher(word->text);
       if (mention == 0 && is_text) mention = command.line;
     }
     if (mention != 0) {

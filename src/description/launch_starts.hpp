@@ -18,8 +18,19 @@ struct LaunchStart {
   int line = 0;
 };
 
-/// The words of arguments that may have several lines.
-[[nodiscard]] std::vector<std::string> launch_words(std::string_view text);
+/// Whether a word is the program, with or without its folder.
+[[nodiscard]] bool is_publisher(std::string_view word);
+/// Whether a text, or what a name is given in it, has the program as one of its words.
+[[nodiscard]] bool mentions_publisher(std::string_view text);
+
+/// What is said of a start that is not read, but would be lost beside others.
+[[nodiscard]] std::string unread_start();
+
+/// The words of arguments, as launch systems divide them: at blanks and ends of lines, with the
+/// quotes and backslashes of a shell. @param line  of the text, for messages
+/// @return kConfig naming file and line: a quote or an escape has no end
+[[nodiscard]] Result<std::vector<std::string>> launch_words(std::string_view text,
+                                                            const std::string& file, int line);
 
 /// What is said of an argument that only the launch system, or the shell, could tell.
 [[nodiscard]] std::string launch_substitution(const std::string& word);

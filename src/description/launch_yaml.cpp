@@ -36,9 +36,22 @@ class LaunchReader : public YamlFields {
       for (const auto& [kind, field] : *action) {
         const auto done = kind == "node"    ? node(field)
                           : kind == "group" ? group(field)
-                                            : Result<void>();
+                                            : other(field);
         if (!done) return done;
       }
+    }
+    return {};
+  }
+
+  // A command, or what a variable stands for: only the launch system could tell what they start.
+  [[nodiscard]] Result<void> other(const Field& field) const {
+    if (!field.value.IsMap()) return {};
+    for (const auto& entry : field.value) {
+      const bool is_text = entry.first.IsScalar() && entry.second.IsScalar();
+      if (!is_text || !mentions_publisher(entry.second.Scalar())) continue;
+      const std::string& key = entry.first.Scalar();
+      if (key != "cmd" && key != "default" && key != "value" && key != "launch-prefix") continue;
+      return error(Errc::kInvalidInput, entry.second.Mark(), unread_start());
     }
     return {};
   }
@@ -81,8 +94,10 @@ class LaunchReader : public YamlFields {
     if (const auto args = keys->find("args"); args != keys->end()) {
       const auto said = text(args->second, "node: args");
       if (!said) return tl::unexpected(said.error());
-      start.words = launch_words(*said);
       start.line = args->second.mark.line + 1;
+      auto words = launch_words(*said, name(), start.line);
+      if (!words) return tl::unexpected(std::move(words.error()));
+      start.words = *std::move(words);
     }
     starts_.push_back(std::move(start));
     return {};

@@ -1,6 +1,7 @@
 #include "description/python_tokens.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
+#include "description/launch_starts.hpp"
 #include "description/python_conditions.hpp"
 #include "description/python_escapes.hpp"
 
@@ -85,6 +87,13 @@ class Tokens {
   void add(Token token) {
     token.other = open_.empty() ? kNone : open_.back();
     token.place = conditions_.here();
+    // Strings that follow each other are one.
+    const bool is_string = token.kind == Token::Kind::kString;
+    if (is_string && !tokens_.empty() && tokens_.back().kind == Token::Kind::kString &&
+        tokens_.back().place == token.place) {
+      tokens_.back().text += token.text;
+      return;
+    }
     tokens_.push_back(std::move(token));
   }
 
@@ -193,6 +202,33 @@ class Calls {
                       tokens_[named].text + " has no arguments here: write them there");
   }
 
+  // Whether a string only tells people something, as far as what is around it tells.
+  [[nodiscard]] bool is_about_text(std::size_t at, const PythonConditions& conditions) const {
+    const auto statement = [&](std::size_t i) { return conditions.statement_of(tokens_[i].place); };
+    const bool begins = at == 0 || statement(at - 1) != statement(at);
+    if (tokens_[at].other == kNone && begins) return true;  // a documentation
+    constexpr std::array<std::string_view, 5> kTexts = {"name", "description", "msg", "help",
+                                                        "message"};
+    constexpr std::array<std::string_view, 6> kPrinting = {"print",  "LogInfo",  ".info",
+                                                           ".debug", ".warning", ".error"};
+    const auto ends_with = [](std::string_view word, std::string_view end) {
+      return word.size() >= end.size() && word.substr(word.size() - end.size()) == end;
+    };
+    constexpr int kOutwards = 4;
+    for (int i = 0; i < kOutwards && at != kNone && at > 0; ++i, at = tokens_[at].other) {
+      const bool named = at >= 2 && std::any_of(kTexts.begin(), kTexts.end(), [&](auto name) {
+                           return is_keyword(at - 2, name);
+                         });
+      const Token& before = tokens_[at - 1];
+      const bool printed =
+          is(at, "(") && before.kind == Token::Kind::kWord &&
+          std::any_of(kPrinting.begin(), kPrinting.end(),
+                      [&](std::string_view name) { return ends_with(before.text, name); });
+      if (named || printed) return true;
+    }
+    return false;
+  }
+
  private:
   [[nodiscard]] bool is(std::size_t i, std::string_view sign) const {
     return i < tokens_.size() && tokens_[i].kind == Token::Kind::kSign && tokens_[i].text == sign;
@@ -218,12 +254,27 @@ class Calls {
       const std::size_t end = tokens_[i].other;
       return ends(end + 1) ? items(i + 1, end) : computed(end + 1);
     }
-    const bool splits = i + 1 < tokens_.size() && tokens_[i + 1].text == ".split";
-    if (!is_string(i) || !splits || !is(i + 2, "(")) return computed(i);
-    const std::size_t end = tokens_[i + 2].other;
+    if (i + 3 >= tokens_.size()) return computed(i);
+    const bool as_shell = tokens_[i].text == "shlex.split" && !is_string(i) && is(i + 1, "(");
+    const std::size_t said = as_shell ? i + 2 : i;
+    const bool at_blanks = !as_shell && tokens_[i + 1].text == ".split" && is(i + 2, "(");
+    if (!is_string(said) || !(at_blanks || as_shell)) return computed(said);
+    const std::size_t end = tokens_[at_blanks ? i + 2 : i + 1].other;
+    const bool says_blank =
+        at_blanks && end == i + 4 && is_string(i + 3) && tokens_[i + 3].text == " ";
+    if (end != i + 3 && !says_blank) return computed(i + 3);
     if (!ends(end + 1)) return computed(end + 1);
-    PythonArguments arguments{{}, tokens_[i].line};
-    for (const auto word : words_of(tokens_[i].text)) arguments.words.emplace_back(word);
+    const Token& text = tokens_[said];
+    PythonArguments arguments{{}, text.line};
+    if (as_shell) {
+      auto words = launch_words(text.text, file_, text.line);
+      if (!words) return tl::unexpected(std::move(words.error()));
+      arguments.words = *std::move(words);
+    } else {
+      std::string line = text.text;
+      std::replace(line.begin(), line.end(), '\n', ' ');
+      for (const auto word : words_of(line)) arguments.words.emplace_back(word);
+    }
     return std::optional(std::move(arguments));
   }
 
@@ -285,7 +336,6 @@ class Variables {
 }  // namespace
 
 Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
-                                                      const std::string& program,
                                                       const std::string& file) {
   PythonConditions conditions;
   const auto tokens = Tokens(text, file, conditions).all();
@@ -296,19 +346,28 @@ Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
   std::size_t read = kNone;  // each bracket is read once, so that the work is bounded
   for (std::size_t i = 0; i < tokens->size(); ++i) {
     const Token& token = (*tokens)[i];
-    if (token.kind != Token::Kind::kString || token.text != program) continue;
-    if (token.other == kNone || token.other == read) continue;
-    read = token.other;
-    auto arguments = calls.around(token.other, i);
-    if (!arguments) return tl::unexpected(std::move(arguments.error()));
-    if (!*arguments) continue;
+    const bool is_string = token.kind == Token::Kind::kString;
+    const bool is_program = is_string && token.text == kStaticPublisher;
+    const bool is_text = is_string || token.text.find('\\') != std::string::npos;
+    if (!is_program && !(is_text && mentions_publisher(token.text))) continue;
+    if (calls.is_about_text(i, conditions)) continue;
+    if (is_program && token.other != kNone && token.other == read) continue;
+    std::optional<PythonArguments> arguments;
+    if (is_program && token.other != kNone) {
+      read = token.other;
+      auto around = calls.around(token.other, i);
+      if (!around) return tl::unexpected(std::move(around.error()));
+      arguments = *std::move(around);
+    }
+    if (!arguments) return file_error(Errc::kInvalidInput, file, token.line, unread_start());
     const int decided = conditions.line_of(token.place);
     if (const int at = decided != 0 ? decided : variables.decided(token.place); at != 0) {
-      return file_error(Errc::kInvalidInput, file, at,
-                        program + " is started under a condition: write what happens");
+      return file_error(
+          Errc::kInvalidInput, file, at,
+          std::string(kStaticPublisher) + " is started under a condition: write what happens");
     }
-    (*arguments)->line = token.line;
-    found.push_back(**std::move(arguments));
+    arguments->line = token.line;
+    found.push_back(*std::move(arguments));
   }
   return found;
 }

@@ -13,12 +13,13 @@ struct PythonArguments {
   int line = 0;
 };
 
-/// Finds the calls that name a program, as in Node(executable='PROGRAM', arguments=['1', 'map']),
-/// without running the file: arguments must be written as they are, in a list or as 'text'.split().
+/// Finds the calls that start static_transform_publisher, as in Node(executable='PROGRAM',
+/// arguments=['1', 'map']), without running the file: arguments must be written as they are, in a
+/// list, as 'text'.split() or as shlex.split('text').
 /// @return kInvalidInput naming file and line: arguments that only Python could compute; a
-///   condition or loop that decides about the call; kConfig: a string or bracket without an end
+///   condition or loop that decides about the call; a text that names the program elsewhere, and
+///   that may start it; kConfig: a string or bracket without an end
 [[nodiscard]] Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
-                                                                    const std::string& program,
                                                                     const std::string& file);
 
 }  // namespace tfdude
