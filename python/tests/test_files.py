@@ -472,9 +472,9 @@ def test_colmap_poses_and_pycolmap_covariances(tmp_path):
     D = np.diag([2, 2, 2, 1, 1, 1])
     assert np.allclose(scaled.X_PC.covariance, D @ J @ sigma @ J.T @ D, rtol=1e-5, atol=1e-8)
     np.savetxt(covariances, [[7, *sigma.ravel()]])
-    assert message(tmp_path, COLMAP, covariances=str(covariances)) == "covariances of file:1: there is no image 7"
+    assert message(tmp_path, COLMAP, covariances=str(covariances)) == "covariances.txt:1: there is no image 7"
     np.savetxt(covariances, [[1, *(-sigma).ravel()]])
-    assert message(tmp_path, COLMAP, covariances=str(covariances)).startswith("covariances of file:1: image 1: cov")
+    assert message(tmp_path, COLMAP, covariances=str(covariances)).startswith("covariances.txt:1: image 1: cov")
     assert "new P.JPG" in read(tmp_path, COLMAP.replace("left/P1180142.JPG", "new P.JPG "))
     assert message(tmp_path, COLMAP.replace("2362.39 248.498 58396 1784.7 268.254 59027\n", "")) == (
         "file:6: is not a line of points, X Y POINT3D_ID each; without points it is empty")

@@ -223,8 +223,8 @@ def test_a_tree_is_written_as_a_graph(tmp_path, network):
                                 Transform(rng.normal(size=3), q / np.linalg.norm(q), A @ A.T + np.eye(6) * 1e-5)))
     text = tfdude.write_frames(frames, "g2o")
     lines = [line.split() for line in text.splitlines()]
-    assert [line[1:] for line in lines if line[0] == "#"] == [["frame", str(i), name] for i, name in enumerate(
-        ["base", "a", "c", "d", "e"])]
+    assert [line for line in lines if line[0] == "#"] == [
+        ["#", "tfdude", "frame", str(i), name] for i, name in enumerate(["base", "a", "c", "d", "e"])]
     assert ["FIX", "0"] in lines
     graph = Graph.__new__(Graph)
     vertices = [line for line in lines if line[0] == "VERTEX_SE3:QUAT"]

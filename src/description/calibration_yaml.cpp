@@ -11,6 +11,7 @@
 
 #include "description/file_edges.hpp"
 #include "description/yaml_fields.hpp"
+#include "types/ros_rules.hpp"
 
 namespace tfdude {
 namespace {
@@ -191,7 +192,12 @@ FileEdges CalibrationReader::kalibr(const YAML::Node& root) const {
 Result<std::string> CalibrationReader::frame(const Fields& entries, const char* key) const {
   const auto found = entries.find(key);
   if (found == entries.end()) return fail(Errc::kConfig, name() + ": " + key + " is missing");
-  return text(found->second, key);
+  const auto said = text(found->second, key);
+  if (!said) return said;
+  std::string id(ros::without_slashes(*said));
+  if (id.empty())
+    return error(Errc::kInvalidInput, found->second.mark, std::string(key) + " is empty");
+  return id;
 }
 
 Result<bool> CalibrationReader::on_hand(const Fields& entries, const YAML::Node& node,

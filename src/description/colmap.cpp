@@ -85,13 +85,22 @@ Result<Pose> camera_pose(const std::vector<std::string_view>& words,
               std::string("is a line of ") + other + ": only images.txt is read");
 }
 
+// X Y POINT3D_ID each; the id of a point that was not triangulated is -1, or the largest number.
+bool are_points(const std::vector<std::string_view>& words) {
+  if (words.size() % 3 != 0) return false;
+  for (std::size_t i = 0; i < words.size(); i += 3) {
+    const bool has_id = count_of(words[i + 2]) || words[i + 2] == "-1";
+    if (!has_id || !number_of(words[i]) || !number_of(words[i + 1])) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 // For each image two lines: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, the pose of the world in
 // the camera; and its points, which may be none.
-FileEdges read_colmap(const std::string& text, const std::string& covariances,
-                      const std::string& name) {
-  const std::string covariances_name = "covariances of " + name;
+FileEdges read_colmap(const std::string& text, const std::string& name,
+                      const std::string& covariances, const std::string& covariances_name) {
   auto given = covariances_of(covariances, covariances_name);
   if (!given) return tl::unexpected(std::move(given.error()));
   std::vector<FileEdge> edges;
@@ -139,7 +148,7 @@ FileEdges read_colmap(const std::string& text, const std::string& covariances,
       given->erase(found);
     }
     edges.push_back(std::move(edge));
-    if (lines.next() && words_of(lines.line()).size() % 3 != 0) {
+    if (lines.next() && !are_points(words_of(lines.line()))) {
       return file_error(Errc::kConfig, name, lines.number(),
                         "is not a line of points, X Y POINT3D_ID each; without points it is empty");
     }

@@ -28,9 +28,12 @@ using FileEdges = Result<std::vector<FileEdge>>;
 [[nodiscard]] FileEdges read_opencv(const std::string& text, const std::string& name);
 [[nodiscard]] FileEdges read_launch(const std::string& text, const std::string& name);
 /// @param covariances  as of FrameFile, its text
-[[nodiscard]] FileEdges read_colmap(const std::string& text, const std::string& covariances,
-                                    const std::string& name);
+[[nodiscard]] FileEdges read_colmap(const std::string& text, const std::string& name,
+                                    const std::string& covariances,
+                                    const std::string& covariances_name);
 [[nodiscard]] FileEdges read_g2o(const std::string& text, const std::string& name);
+/// What write_frames() writes before the number and the name of a vertex, for read_g2o().
+inline constexpr std::string_view kG2oName = "# tfdude frame ";
 
 /// The pose that a rotation matrix of few digits stands for: the nearest rotation, if no entry
 /// differs from that by more than 1e-3, as after rounding to three decimals.

@@ -72,7 +72,8 @@ Result<FrameFormat> format_of(const std::string& text, const std::string& name) 
   return fail(Errc::kConfig, name + ": cannot tell its format: say which it is");
 }
 
-FileEdges read_edges(const std::string& text, const FrameFile& file, const std::string& name) {
+FileEdges read_edges(const std::string& text, const FrameFile& file, const std::string& name,
+                     const std::string& covariances_name) {
   const auto format = file.format ? Result<FrameFormat>(*file.format) : format_of(text, name);
   if (!format) return tl::unexpected(format.error());
   if (!file.covariances.empty() && *format != FrameFormat::kColmap) {
@@ -93,7 +94,7 @@ FileEdges read_edges(const std::string& text, const FrameFile& file, const std::
     case FrameFormat::kOpenCv:
       return read_opencv(text, name);
     case FrameFormat::kColmap:
-      return read_colmap(text, file.covariances, name);
+      return read_colmap(text, name, file.covariances, covariances_name);
     case FrameFormat::kG2o:
       return read_g2o(text, name);
   }
@@ -202,6 +203,18 @@ class Adopted {
   std::map<std::string, bool> used_;  // of the names that are given
 };
 
+Result<std::vector<FrameSpec>> parsed(const std::string& text, const FrameFile& file,
+                                      const std::string& covariances_name) {
+  const std::string name = printable(file.file);
+  try {
+    auto edges = read_edges(text, file, name, covariances_name);
+    if (!edges) return tl::unexpected(std::move(edges.error()));
+    return Adopted(file, name).frames(*std::move(edges));
+  } catch (const std::exception& e) {
+    return fail(Errc::kConfig, name + ": " + printable(e.what()));
+  }
+}
+
 }  // namespace
 
 const char* to_string(FrameFormat format) {
@@ -220,14 +233,7 @@ Result<FrameFormat> frame_format_named(std::string_view name) {
 }
 
 Result<std::vector<FrameSpec>> parse_frames(const std::string& text, const FrameFile& file) {
-  const std::string name = printable(file.file);
-  try {
-    auto edges = read_edges(text, file, name);
-    if (!edges) return tl::unexpected(std::move(edges.error()));
-    return Adopted(file, name).frames(*std::move(edges));
-  } catch (const std::exception& e) {
-    return fail(Errc::kConfig, name + ": " + printable(e.what()));
-  }
+  return parsed(text, file, "covariances of " + printable(file.file));
 }
 
 Result<std::vector<FrameSpec>> load_frames(const FrameFile& file) {
@@ -239,7 +245,7 @@ Result<std::vector<FrameSpec>> load_frames(const FrameFile& file) {
     if (!covariances) return tl::unexpected(std::move(covariances.error()));
     read.covariances = *std::move(covariances);
   }
-  return parse_frames(*text, read);
+  return parsed(*text, read, printable(file.covariances));
 }
 
 }  // namespace tfdude

@@ -1,5 +1,7 @@
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -35,12 +37,13 @@ class GraphReader {
       words_ = words_of(lines.line());
       if (words_.empty()) continue;
       if (words_[0][0] == '#') {
-        // A name that write_frames() has noted.
-        if (words_.size() >= 4 && words_[1] == "frame") {
-          const auto begin = static_cast<std::size_t>(words_[3].data() - lines.line().data());
-          names_[std::string(words_[2])] = lines.line().substr(begin);
-        }
+        comment(lines.line());
         continue;
+      }
+      const auto earlier = std::exchange(earlier_, std::nullopt);
+      if (earlier && words_.size() > 1 && words_[0] == "VERTEX_SE3:QUAT" &&
+          words_[1] == earlier->first) {
+        names_.insert(*earlier);
       }
       auto ok = words_[0] == "VERTEX_SE3:QUAT" ? vertex()
                 : words_[0] == "EDGE_SE3:QUAT" ? edge()
@@ -104,6 +107,20 @@ class GraphReader {
 
   [[nodiscard]] tl::unexpected<Error> error(const std::string& message) const {
     return file_error(Errc::kInvalidInput, name_, line_, message);
+  }
+
+  // A name that write_frames() has noted. Earlier versions wrote "# frame NUMBER NAME" before the
+  // vertex; only there, and of one word, it is no remark of somebody else.
+  void comment(std::string_view line) {
+    earlier_.reset();
+    if (words_.size() >= 5 && line.substr(0, kG2oName.size()) == kG2oName) {
+      const auto begin = static_cast<std::size_t>(words_[4].data() - line.data());
+      const std::string_view last = words_.back();
+      const auto end = static_cast<std::size_t>(last.data() + last.size() - line.data());
+      names_[std::string(words_[3])] = line.substr(begin, end - begin);
+    } else if (words_.size() == 4 && words_[0] == "#" && words_[1] == "frame") {
+      earlier_.emplace(words_[2], words_[3]);
+    }
   }
 
   [[nodiscard]] Result<Pose> pose(std::size_t first) const {
@@ -175,6 +192,7 @@ class GraphReader {
   std::vector<Ends> ends_;                    // vertices may stand behind their edges
   std::vector<std::pair<std::string, int>> fixed_;
   std::map<std::string, std::string> names_;
+  std::optional<std::pair<std::string, std::string>> earlier_;  // what the line before names
 };
 
 }  // namespace

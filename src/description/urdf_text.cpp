@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -12,6 +11,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "description/file_edges.hpp"
 #include "description/file_text.hpp"
 #include "description/xml_text.hpp"
 
@@ -80,18 +80,13 @@ int infinity_of(const std::string& text) {
   return word == "inf" || word == "infinity" ? sign : 0;
 }
 
-// The quaternion x y z w of an <origin>.
-std::optional<Eigen::Quaterniond> quaternion_of(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n";
-  Eigen::Vector4d xyzw;
-  for (double& number : xyzw) {
-    text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (code != std::errc() || !std::isfinite(number)) return std::nullopt;
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-  }
-  if (text.find_first_not_of(kBlanks) != std::string_view::npos) return std::nullopt;
-  return Eigen::Quaterniond(xyzw);
+// The quaternion x y z w of an <origin>. Its numbers are read as those of the other attributes.
+std::optional<Eigen::Quaterniond> quaternion_of(const std::string& text) {
+  const auto words = words_of(text);
+  const auto xyzw = numbers_of<4>(words, 0);
+  if (words.size() != 4 || !xyzw) return std::nullopt;
+  const auto& [x, y, z, w] = *xyzw;
+  return Eigen::Quaterniond(w, x, y, z);
 }
 
 std::string described(const char* kind, const std::string& name) {

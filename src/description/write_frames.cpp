@@ -233,7 +233,7 @@ Result<std::string> g2o(const Frames& frames) {
   std::string text;
   for (const std::string& id : ids) {
     const std::string number = std::to_string(numbers.at(id));
-    if (number != id) text += "# frame " + number + " " + id + "\n";
+    if (number != id) text += std::string(kG2oName) + number + " " + id + "\n";
     text += "VERTEX_SE3:QUAT " + number + " " + xyz_quat(poses[id], " ") + "\n";
   }
   for (const std::string& id : roots) text += "FIX " + std::to_string(numbers.at(id)) + "\n";

@@ -256,6 +256,59 @@ TEST_CASE("frame file: of COLMAP only images.txt is read, and each image once") 
         "file:1: is a line of points3D.txt: only images.txt is read");
 }
 
+TEST_CASE("frame file: of COLMAP no image is taken for the points of the one before") {
+  const std::string image = "1 1 0 0 0 1 2 3 1 p.jpg\n";
+  const std::string of_three_words = "2 0.5 0.5 0.5 0.5 1.5 2 3 1 q r s.jpg\n";
+  CHECK(refusal(image + of_three_words) ==
+        "file:2: is not a line of points, X Y POINT3D_ID each; without points it is empty");
+  CHECK(edges_of(image + "\n" + of_three_words + "1.5 2.5 -1 2 3 18446744073709551615\n") ==
+        "world>p.jpg world>q r s.jpg ");
+  CHECK_THAT(refusal(image + "1.5 2.5 0.5\n"),
+             ContainsSubstring("file:2: is not a line of points"));
+}
+
+TEST_CASE("frame file: errors about covariances of images name their file") {
+  const testing::TemporaryDirectory directory;
+  FrameFile file;
+  file.file = directory.write("images.txt", "1 1 0 0 0 1 2 3 1 p.jpg\n\n");
+  file.covariances = directory.write("sigma.txt", "\n1 2 3\n");
+  const auto frames = load_frames(file);
+  REQUIRE_FALSE(frames);
+  CHECK(frames.error().message == file.covariances + ":2: is not an IMAGE_ID and 36 numbers");
+}
+
+TEST_CASE("frame file: names of vertices are those that an export has noted") {
+  const std::string vertices = "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n";
+  CHECK(edges_of("# frame 1 was lost\n# frame 0 lost\n# tfdude frame\n" + vertices) ==
+        "map>0 map>1 ");
+  CHECK(edges_of("# tfdude frame 1 hall \t\r\n# tfdude frame 0 a b\r\n" + vertices) ==
+        "map>a b map>hall ");
+  // Of an earlier export, directly before the vertex.
+  CHECK(edges_of("# frame 0 hall\r\n" + vertices) == "map>hall map>1 ");
+  CHECK(edges_of("# frame 1 hall\n" + vertices) == "map>0 map>1 ");
+  CHECK(edges_of("# frame 0 was lost\n" + vertices) == "map>0 map>1 ");
+  FrameSpec frame;
+  frame.id = "tool";
+  frame.parent = "hand";
+  frame.X_PC.covariance = *Covariance::from_stddev({0.1, 0.1, 0.1, 0.1, 0.1, 0.1});
+  const auto text = write_frames({frame}, FrameFormat::kG2o);
+  REQUIRE(text);
+  CHECK_THAT(*text, ContainsSubstring("# tfdude frame 1 tool\n"));
+  CHECK(edges_of(*text) == "map>hand map>tool ");
+}
+
+TEST_CASE("frame file: a hand-eye calibration may have leading slashes") {
+  for (const char* base : {"/base", "base"}) {
+    const std::string text =
+        std::string("eye_on_hand: false\nrobot_base_frame: ") + base +
+        "\ntracking_base_frame: //cam\ntransformation: {x: 0, y: 0, z: 0, qx: 0, qy: 0, qz: 0, "
+        "qw: 1}\n";
+    CHECK(edges_of(text) == "base>cam ");
+  }
+  CHECK(refusal("eye_on_hand: false\nrobot_base_frame: /\n", FrameFormat::kEyeOnBase) ==
+        "file:2: robot_base_frame is empty");
+}
+
 TEST_CASE("frame file: a format that the file contradicts is rejected") {
   const std::string text =
       "eye_on_hand: true\nrobot_effector_frame: tool0\nrobot_base_frame: base\n"

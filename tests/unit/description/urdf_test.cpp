@@ -207,6 +207,8 @@ TEST_CASE("urdf: the rotation of an origin may be a quaternion") {
   CHECK(turned.rotation().coeffs() == Eigen::Vector4d(0.5, -0.5, 0.5, 0.5));
   const auto same = origin("rpy=\"0 0 0.3\"").pose;
   const auto quaternion = origin("quat_xyzw=\"0 0 0.149438 0.988771\"").pose;
+  CHECK(log(origin("xyz=\"+1 2 3\" quat_xyzw=\"+0.5 -0.5 +0.5 0.5\"").pose.inverse() * turned)
+            .norm() < 1e-12);
   CHECK(same.rotation().angularDistance(quaternion.rotation()) < 1e-6);
   const auto fixed = frames_of(pair("fixed", "<origin quat_xyzw=\"1 0 0 0\"/>"))[1].X_PC.pose;
   CHECK(fixed.rotation().coeffs() == Eigen::Vector4d(1, 0, 0, 0));
