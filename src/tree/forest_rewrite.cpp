@@ -20,6 +20,13 @@ std::string sample_of(std::string_view id, std::size_t i) {
   return "frame " + quote(id) + ": sample " + std::to_string(i);
 }
 
+Result<void> check_interval(std::string_view id, const TimeInterval& interval) {
+  if (interval.from <= interval.to) return {};
+  return fail(Errc::kInvalidInput, "frame " + quote(id) + ": the interval ends, at " +
+                                       readable(interval.to) + ", before it begins, at " +
+                                       readable(interval.from));
+}
+
 Result<void> check_samples(std::string_view id, const TimeInterval& interval,
                            const std::vector<EdgeSample>& samples) {
   if (samples.empty()) {
@@ -28,18 +35,21 @@ Result<void> check_samples(std::string_view id, const TimeInterval& interval,
   if (auto ok = check_stamp(interval.from); !ok) {
     return fail_at("frame " + quote(id) + ": the interval", ok.error());
   }
+  const auto invalid = [&](std::size_t i, const std::string& why) {
+    return fail(Errc::kInvalidInput,
+                sample_of(id, i) + ", of " + readable(samples[i].stamp) + ", " + why);
+  };
+  // First the order: an interval from the first to the last of them may have none.
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    if (samples[i].stamp > samples[i - 1].stamp) continue;
+    return invalid(i, "is not later than the one before");
+  }
+  if (auto ok = check_interval(id, interval); !ok) return ok;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const EdgeSample& sample = samples[i];
-    const auto invalid = [&](const std::string& why) {
-      return fail(Errc::kInvalidInput,
-                  sample_of(id, i) + ", of " + readable(sample.stamp) + ", " + why);
-    };
     if (sample.stamp < interval.from || sample.stamp > interval.to) {
-      return invalid("is outside of the interval from " + readable(interval.from) + " to " +
-                     readable(interval.to));
-    }
-    if (i > 0 && sample.stamp <= samples[i - 1].stamp) {
-      return invalid("is not later than the one before");
+      return invalid(i, "is outside of the interval from " + readable(interval.from) + " to " +
+                            readable(interval.to));
     }
     if (is_finite(sample.X_PC)) continue;
     return fail_at(sample_of(id, i), check_value(id, sample.X_PC).error());
@@ -52,10 +62,7 @@ Result<void> check_samples(std::string_view id, const TimeInterval& interval,
 Result<void> Forest::Impl::check_rewrite(const HeldVersion& edge, const TimeInterval& interval,
                                          std::size_t count) {
   const std::string who = "frame " + quote(edge.name->text);
-  if (interval.from > interval.to) {
-    return fail(Errc::kInvalidInput, who + ": the interval ends, at " + readable(interval.to) +
-                                         ", before it begins, at " + readable(interval.from));
-  }
+  if (auto ok = check_interval(edge.name->text, interval); !ok) return ok;
   if (!edge.moving()) {
     return fail(Errc::kInvalidInput, who + " is static: it has no samples to rewrite");
   }

@@ -143,11 +143,22 @@ TEST_CASE("rewrite: an interval, lines of JSON from a pipe, and errors that name
   };
   const std::string names = "edge,stamp,x,y,z\n";
   CHECK_THAT(why("odom", names + "odom,1695000001,0,0,0\nmap,1695000002,0,0,0\n"),
-             ContainsSubstring("line 3"));
+             ContainsSubstring("wrong.csv, line 3: "));
   CHECK_THAT(why("odom", "edge,x,y,z\nodom,0,0,0\n"), ContainsSubstring("no stamp"));
   CHECK_THAT(why("odom", names), ContainsSubstring("no samples"));
   CHECK_THAT(why("odom", names + "odom,1695000002,0,0,0\nodom,1695000001,0,0,0\n"),
-             ContainsSubstring("sample"));
+             ContainsSubstring("wrong.csv, line 3: its stamp, ") &&
+                 ContainsSubstring(", is not later than ") &&
+                 ContainsSubstring(" of the sample before"));
+  const auto within = [&](const char* from, const char* to) {
+    return slam.domain.cli({"rewrite", "odom", one, "--from", from, "--to", to}).err;
+  };
+  CHECK_THAT(within("1695000004", "1695000002"),
+             ContainsSubstring("--from, ") && ContainsSubstring(", is after --to, "));
+  CHECK_THAT(within("1695000004", "1695000005"),
+             ContainsSubstring("one.jsonl, line 1: its stamp, ") &&
+                 ContainsSubstring(", is before --from, "));
+  CHECK_THAT(within("1695000001", "1695000002"), ContainsSubstring(", is after --to, "));
   CHECK_THAT(why("nobody", names + "nobody,1695000001,0,0,0\n"), ContainsSubstring("nobody"));
   CHECK(slam.x("1695000003") == 1);
 }

@@ -20,12 +20,17 @@ struct Rewrite final : FrameCommand {
   }
 
   int ask(Client& client, const Common& common) const override {
-    const auto samples = read(common);
-    if (!samples) return report(samples.error(), common);
     const auto begin = optional_stamp(client, from);
     if (!begin) return report(begin.error(), common);
     const auto end = optional_stamp(client, to);
     if (!end) return report(end.error(), common);
+    if (*begin && *end && **begin > **end) {
+      return report({Errc::kInvalidInput,
+                     "--from, " + readable(**begin) + ", is after --to, " + readable(**end)},
+                    common);
+    }
+    const auto samples = read(common, *begin, *end);
+    if (!samples) return report(samples.error(), common);
     const TimeInterval interval{begin->value_or(samples->front().stamp),
                                 end->value_or(samples->back().stamp)};
     if (auto done = client.rewrite(id, interval, *samples); !done) {
@@ -41,15 +46,19 @@ struct Rewrite final : FrameCommand {
                       readable(interval.from) + " to " + readable(interval.to) + "\n");
   }
 
-  /// At least one.
-  [[nodiscard]] Result<std::vector<EdgeSample>> read(const Common& common) const {
+  /// At least one, in order and within the interval.
+  [[nodiscard]] Result<std::vector<EdgeSample>> read(const Common& common,
+                                                     const std::optional<Time>& begin,
+                                                     const std::optional<Time>& end) const {
     auto lines = Lines::open(file, std::nullopt);
     if (!lines) return tl::unexpected(lines.error());
     SampleReader reader(common.angles);
     std::vector<EdgeSample> samples;
     while (const auto line = lines->next()) {
       const auto wrong = [&](const std::string& why) {
-        return fail(Errc::kInvalidInput, "line " + std::to_string(lines->number()) + ": " + why);
+        const std::string name = file == "-" ? "standard input" : printable(file);
+        return fail(Errc::kInvalidInput,
+                    name + ", line " + std::to_string(lines->number()) + ": " + why);
       };
       const auto sample = reader.read(*line);
       if (!sample) return wrong(sample.error().message);
@@ -59,6 +68,16 @@ struct Rewrite final : FrameCommand {
         return wrong("it is not about edge " + quote(id));
       }
       if (!stamp) return wrong("it has no stamp");
+      if (!samples.empty() && *stamp <= samples.back().stamp) {
+        return wrong("its stamp, " + readable(*stamp) + ", is not later than " +
+                     readable(samples.back().stamp) + " of the sample before");
+      }
+      if (begin && *stamp < *begin) {
+        return wrong("its stamp, " + readable(*stamp) + ", is before --from, " + readable(*begin));
+      }
+      if (end && *stamp > *end) {
+        return wrong("its stamp, " + readable(*stamp) + ", is after --to, " + readable(*end));
+      }
       samples.push_back({*stamp, edges.front().X_PC});
     }
     if (samples.empty()) return fail(Errc::kInvalidInput, quote(file) + " has no samples");
