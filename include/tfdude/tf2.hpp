@@ -63,12 +63,8 @@ class Buffer {
       const S& source_time, const std::string& fixed, const D& timeout = {}) const {
     const Query at_target = query(tf2::detail::nanoseconds_of(target_time));
     const Query at_source = query(tf2::detail::nanoseconds_of(source_time));
-    const Milliseconds wait = milliseconds(tf2::detail::nanoseconds_of(timeout));
-    const std::string a = name(target);
-    const std::string b = name(source);
-    const std::string c = name(fixed);
-    if (a.empty() || b.empty() || c.empty()) tf2::detail::raise(no_frame());
-    auto X = source_->lookup_over(a, at_target, b, at_source, c, wait);
+    auto X = look_up_over(target, at_target, source, at_source, fixed,
+                          tf2::detail::nanoseconds_of(timeout));
     if (!X) tf2::detail::raise(X.error());
     if (at_target.at) X->stamp = at_target.at;
     return message(target, source, *X, Time());
@@ -87,6 +83,24 @@ class Buffer {
   [[nodiscard]] bool canTransform(const std::string& target, const std::string& source,
                                   const T& time, std::string* error) const {
     return canTransform(target, source, time, tf2::Duration(), error);
+  }
+  /// The same with two times, as lookupTransform().
+  template <class T, class S, class D = tf2::Duration>
+  [[nodiscard]] bool canTransform(const std::string& target, const T& target_time,
+                                  const std::string& source, const S& source_time,
+                                  const std::string& fixed, const D& timeout = {},
+                                  std::string* error = nullptr) const {
+    const auto X = look_up_over(target, query(tf2::detail::nanoseconds_of(target_time)), source,
+                                query(tf2::detail::nanoseconds_of(source_time)), fixed,
+                                tf2::detail::nanoseconds_of(timeout));
+    if (!X && error != nullptr) *error = X.error().message;
+    return X.has_value();
+  }
+  template <class T, class S>
+  [[nodiscard]] bool canTransform(const std::string& target, const T& target_time,
+                                  const std::string& source, const S& source_time,
+                                  const std::string& fixed, std::string* error) const {
+    return canTransform(target, target_time, source, source_time, fixed, tf2::Duration(), error);
   }
 
   /// A message with a header, in another frame, at its own stamp. @throws as lookupTransform()
@@ -163,14 +177,24 @@ class Buffer {
     return source_->lookup(a, b, query(at), milliseconds(timeout));
   }
 
+  [[nodiscard]] Result<StampedTransform> look_up_over(
+      const std::string& target, const Query& at_target, const std::string& source,
+      const Query& at_source, const std::string& fixed, tf2::Duration timeout) const {
+    const std::string a = name(target);
+    const std::string b = name(source);
+    const std::string c = name(fixed);
+    if (a.empty() || b.empty() || c.empty()) return tl::unexpected(no_frame());
+    return source_->lookup_over(a, at_target, b, at_source, c, milliseconds(timeout));
+  }
+
   // A static transform holds for the time that was asked for.
   [[nodiscard]] static tf2::TransformStamped message(const std::string& target,
                                                      const std::string& source,
                                                      const StampedTransform& X, Time asked) {
     tf2::TransformStamped message;
     tf2::detail::set_stamp(message.header.stamp, X.stamp.value_or(asked));
-    message.header.frame_id = target;
-    message.child_frame_id = source;
+    message.header.frame_id = name(target);
+    message.child_frame_id = name(source);
     tf2::detail::set_vector(message.transform.translation, X.pose.translation());
     tf2::detail::set_rotation(message.transform.rotation, X.pose.rotation());
     message.covariance = X.covariance;

@@ -164,6 +164,8 @@ TEST_CASE("tf2: messages as of ROS 1, a slash before frames, two times") {
       buffer.lookupTransform("/map", "/follower", RosTime{10, 250'000'000}, RosDuration{0.1});
   CHECK(X.header.stamp.nsec == 250'000'000);
   CHECK(X.transform.translation.x == Approx(1.25));
+  CHECK(X.header.frame_id == "map");
+  CHECK(X.child_frame_id == "follower");
   CHECK(tf2::transformToEigen(X).translation().x() == Approx(1.25));
   // Zero is the newest; a static transform has the time that was asked for.
   const RosTransformStamped newest = buffer.lookupTransform("map", "follower", RosTime{});
@@ -183,6 +185,45 @@ TEST_CASE("tf2: messages as of ROS 1, a slash before frames, two times") {
   buffer.transform(pose, later, "follower", RosTime{11, 0}, "odom");
   CHECK(later.pose.position.x == Approx(-1));
   CHECK(later.header.stamp.sec == 11);
+}
+
+TEST_CASE("tf2: parts of what a lookup returns are those of messages") {
+  const Robot robot;
+  const auto t = robot.buffer.lookupTransform("/map", "leader", tf2::timeFromSec(10.5));
+  geometry_msgs::msg::PoseStamped pose;
+  pose.header = t.header;
+  pose.pose.orientation = t.transform.rotation;
+  pose.pose.position = t.transform.translation;
+  CHECK(pose.header.frame_id == "map");
+  CHECK(pose.header.stamp.sec == 10);
+  CHECK(pose.header.stamp.nanosec == 500'000'000);
+  CHECK(pose.pose.position.x == Approx(3));
+  CHECK(pose.pose.orientation.w == Approx(1));
+  geometry_msgs::msg::TransformStamped message;
+  message.transform = t.transform;
+  CHECK(message.transform.translation.y == Approx(2));
+  const RosHeader header = t.header;
+  CHECK(header.stamp.nsec == 500'000'000);
+  const auto length = [](const geometry_msgs::msg::Vector3& v) { return std::hypot(v.x, v.y); };
+  CHECK(length(t.transform.translation) == Approx(std::hypot(3, 2)));
+  CHECK(tf2::transformToEigen(t.transform).translation().y() == Approx(2));
+  CHECK(tf2::transformToEigen(message.transform).translation().y() == Approx(2));
+}
+
+TEST_CASE("tf2: two times can be asked for before") {
+  const Robot robot;
+  const auto& buffer = robot.buffer;
+  std::string error;
+  CHECK(buffer.canTransform("/follower", RosTime{11, 0}, "follower", RosTime{10, 0}, "/odom"));
+  CHECK(buffer.canTransform("follower", tf2::timeFromSec(11), "follower", tf2::timeFromSec(10),
+                            "odom", tf2::durationFromSec(0.1), &error));
+  CHECK(error.empty());
+  CHECK_FALSE(buffer.canTransform("follower", tf2::timeFromSec(12), "follower",
+                                  tf2::timeFromSec(10), "odom", &error));
+  CHECK_THAT(error, ContainsSubstring("follower"));
+  CHECK_FALSE(buffer.canTransform("follower", tf2::timeFromSec(11), "follower",
+                                  tf2::timeFromSec(10), "/", tf2::Duration(), &error));
+  CHECK(error == "an empty frame id");
 }
 
 TEST_CASE("tf2: the covariance of a pose is turned, and that of the path is added") {

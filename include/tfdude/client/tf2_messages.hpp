@@ -97,6 +97,17 @@ template <class T>
 using Stamped = decltype(std::declval<T&>().child_frame_id, std::declval<T&>().transform.rotation.w,
                          std::declval<T&>().header.stamp);
 
+// Parts of messages by themselves.
+template <class T>
+using Xyz =
+    decltype(std::declval<T&>().x = 0.0, std::declval<T&>().y = 0.0, std::declval<T&>().z = 0.0);
+template <class T>
+using W = decltype(std::declval<T&>().w = 0.0);
+template <class T>
+using TransformItself = decltype(std::declval<T&>().translation.x, std::declval<T&>().rotation.w);
+template <class T>
+using HeaderItself = decltype(std::declval<T&>().stamp, std::declval<T&>().frame_id);
+
 template <class T>
 inline constexpr bool kUnknown = false;
 
@@ -204,8 +215,8 @@ void set_pose(Message& pose, const Pose& value) {
 
 }  // namespace detail
 
-/// What a lookup returns. It has the members of geometry_msgs' TransformStamped, and converts to
-/// the caller's type of it.
+/// What a lookup returns. It has the members of geometry_msgs' TransformStamped. It and each of its
+/// parts convert to the caller's types of them.
 struct TransformStamped {
   struct Stamp {
     std::int32_t sec = 0;
@@ -222,21 +233,53 @@ struct TransformStamped {
   struct Header {
     Stamp stamp;
     std::string frame_id;
+
+    template <class T, class = std::enable_if_t<detail::Has<T, detail::HeaderItself>::value>>
+    operator T() const {  // NOLINT(google-explicit-constructor): it is one
+      T header;
+      detail::set_stamp(header.stamp, Time(detail::nanoseconds_of(stamp)));
+      header.frame_id = frame_id;
+      return header;
+    }
   };
   struct Vector3 {
     double x = 0;
     double y = 0;
     double z = 0;
+
+    template <class T, class = std::enable_if_t<detail::Has<T, detail::Xyz>::value &&
+                                                !detail::Has<T, detail::W>::value>>
+    operator T() const {  // NOLINT(google-explicit-constructor): it is one, or a point
+      T vector;
+      detail::set_vector(vector, detail::vector_of(*this));
+      return vector;
+    }
   };
   struct Quaternion {
     double x = 0;
     double y = 0;
     double z = 0;
     double w = 1;
+
+    template <class T, class = std::enable_if_t<detail::Has<T, detail::Xyz>::value &&
+                                                detail::Has<T, detail::W>::value>>
+    operator T() const {  // NOLINT(google-explicit-constructor): it is one
+      T quaternion;
+      detail::set_rotation(quaternion, detail::rotation_of(*this));
+      return quaternion;
+    }
   };
   struct Parts {
     Vector3 translation;
     Quaternion rotation;
+
+    template <class T, class = std::enable_if_t<detail::Has<T, detail::TransformItself>::value>>
+    operator T() const {  // NOLINT(google-explicit-constructor): it is a transform
+      T transform;
+      detail::set_vector(transform.translation, detail::vector_of(translation));
+      detail::set_rotation(transform.rotation, detail::rotation_of(rotation));
+      return transform;
+    }
   };
 
   Header header;
@@ -247,20 +290,22 @@ struct TransformStamped {
   template <class Message, class = std::enable_if_t<detail::Has<Message, detail::Stamped>::value>>
   operator Message() const {  // NOLINT(google-explicit-constructor): it is one
     Message message;
-    detail::set_stamp(message.header.stamp, Time(detail::nanoseconds_of(header.stamp)));
-    message.header.frame_id = header.frame_id;
+    message.header = header;
     message.child_frame_id = child_frame_id;
-    detail::set_vector(message.transform.translation, detail::vector_of(transform.translation));
-    detail::set_rotation(message.transform.rotation, detail::rotation_of(transform.rotation));
+    message.transform = transform;
     return message;
   }
 };
 
-/// X_AB of a TransformStamped, or of anything with its members.
+/// X_AB of a TransformStamped, of its transform, or of anything with the members of either.
 template <class Message>
 [[nodiscard]] Eigen::Isometry3d transformToEigen(const Message& message) {
-  return to_isometry(detail::pose_of(detail::rotation_of(message.transform.rotation),
-                                     detail::vector_of(message.transform.translation)));
+  if constexpr (detail::Has<Message, detail::TransformItself>::value) {
+    return to_isometry(detail::pose_of(detail::rotation_of(message.rotation),
+                                       detail::vector_of(message.translation)));
+  } else {
+    return transformToEigen(message.transform);
+  }
 }
 
 /// Brings a message to the frame of a transform. `out` may be `in`. Messages with a header get that
