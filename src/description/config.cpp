@@ -201,6 +201,12 @@ Result<FrameSpec> ConfigReader::frame(const YAML::Node& node, const Config& conf
   auto X_PC = transform(node, *entries, place, config.covariance);
   if (!X_PC) return tl::unexpected(X_PC.error());
   spec.X_PC = *X_PC;
+  if (spec.parent.empty()) {
+    const char* needs = "needs parent: it places the frame in that one";
+    if (auto ok = check_no_pose(*entries, place, needs); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+  }
   if (const auto found = entries->find("history"); found != entries->end()) {
     auto own = history(found->second, place, config.history);
     if (!own) return tl::unexpected(own.error());

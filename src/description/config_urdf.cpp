@@ -8,11 +8,9 @@
 namespace tfdude {
 namespace {
 
-constexpr std::array<std::string_view, 13> kUrdfKeys = {
-    "file", "root",       "xyz",    "rpy",   "quat",          "matrix", "stddev",
-    "cov",  "covariance", "prefix", "links", "strict_limits", "joints"};
-constexpr std::array<std::string_view, 7> kRootKeys = {"xyz",    "rpy", "quat",      "matrix",
-                                                       "stddev", "cov", "covariance"};
+constexpr std::array<std::string_view, 14> kUrdfKeys = {
+    "file",   "root", "xyz",        "rpy",    "quat",  "matrix",        "geodetic",
+    "stddev", "cov",  "covariance", "prefix", "links", "strict_limits", "joints"};
 constexpr std::array<std::string_view, 4> kJointKeys = {"position", "stddev", "sample_stddev",
                                                         "origin"};
 // The key in files of earlier versions.
@@ -27,14 +25,7 @@ constexpr std::array<std::string_view, 3> kOriginKeys = {"stddev", "cov", "covar
 Result<void> UrdfFields::stand(const YAML::Node& node, const Fields& entries,
                                const std::string& place, UrdfPart& part) const {
   if (entries.find("root") == entries.end()) {
-    for (const auto key : kRootKeys) {
-      const auto found = entries.find(key);
-      if (found == entries.end()) continue;
-      return error(
-          Errc::kConfig, found->second.mark,
-          place + ": " + found->first + " needs root: it places the root link in that frame");
-    }
-    return {};
+    return check_no_transform(entries, place, "needs root: it places the root link in that frame");
   }
   auto root = id(entries, "root", place);
   if (!root) return tl::unexpected(std::move(root.error()));

@@ -176,4 +176,25 @@ Result<Transform> YamlFields::transform(const YAML::Node& node, const Fields& fi
                place + ": " + (named ? "" : std::string(key) + ": ") + message);
 }
 
+Result<void> YamlFields::check_none(const Fields& fields, const std::vector<const char*>& keys,
+                                    const std::string& place, const std::string& needs) const {
+  for (const char* key : keys) {
+    const auto found = fields.find(key);
+    if (found == fields.end()) continue;
+    return error(Errc::kConfig, found->second.mark, place + ": " + key + " " + needs);
+  }
+  return {};
+}
+
+Result<void> YamlFields::check_no_pose(const Fields& fields, const std::string& place,
+                                       const std::string& needs) const {
+  return check_none(fields, {"xyz", "rpy", "quat", "matrix", "geodetic"}, place, needs);
+}
+
+Result<void> YamlFields::check_no_transform(const Fields& fields, const std::string& place,
+                                            const std::string& needs) const {
+  auto ok = check_no_pose(fields, place, needs);
+  return ok ? check_none(fields, {"stddev", "cov", "covariance"}, place, needs) : ok;
+}
+
 }  // namespace tfdude

@@ -76,11 +76,21 @@ class YamlFields {
   [[nodiscard]] Result<Transform> transform(const YAML::Node& node, const Fields& fields,
                                             const std::string& place,
                                             const StatedCovariance& otherwise) const;
+  /// Rejects a pose of transform(), where there is nothing that it would place.
+  /// @param needs  what is missing, as in "needs root: ..."
+  [[nodiscard]] Result<void> check_no_pose(const Fields& fields, const std::string& place,
+                                           const std::string& needs) const;
+  /// As check_no_pose(), also of a covariance.
+  [[nodiscard]] Result<void> check_no_transform(const Fields& fields, const std::string& place,
+                                                const std::string& needs) const;
 
  private:
   [[nodiscard]] Result<Fields> fields(const YAML::Node& map,
                                       const std::vector<std::string_view>& allowed,
                                       const std::string& what) const;
+
+  [[nodiscard]] Result<void> check_none(const Fields& fields, const std::vector<const char*>& keys,
+                                        const std::string& place, const std::string& needs) const;
 
   std::string name_;
 };

@@ -59,7 +59,7 @@ struct Keeper {
 
 constexpr const char* kArms = R"(partition: arms
 frames:
-  - {id: arm, xyz: [1, 0, 0]}
+  - {id: arm}
   - {id: hand, parent: arm, xyz: [10, 0, 0]}
 )";
 
@@ -175,7 +175,7 @@ TEST_CASE("persistence: edited entries of a configuration override the stored st
   }
   arms.config = arms.directory.write("edited.yaml", R"(partition: arms
 frames:
-  - {id: arm, xyz: [2, 0, 0]}
+  - {id: arm, stddev: [1, 1, 1, 1, 1, 1]}
   - {id: hand, parent: arm, xyz: [10, 0, 0]}
   - {id: eye, parent: arm}
 )");

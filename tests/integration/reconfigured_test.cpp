@@ -29,10 +29,10 @@ using Arguments = std::vector<std::string>;
 
 constexpr const char* kBoth = R"(partition: arms
 frames:
-  - {id: arm, xyz: [1, 0, 0]}
+  - {id: arm}
   - {id: hand, parent: arm, xyz: [10, 0, 0]}
 )";
-constexpr const char* kArmOnly = "partition: arms\nframes:\n  - {id: arm, xyz: [1, 0, 0]}\n";
+constexpr const char* kArmOnly = "partition: arms\nframes:\n  - {id: arm}\n";
 
 // A daemon of the partition "arms" that is killed and started with other arguments.
 struct Arms {
@@ -175,7 +175,7 @@ TEST_CASE("reconfigured: --check prints what a configuration would change and ch
   const CliResult cycle =
       arms.check({"--config", arms.directory.write("cycle.yaml", R"(partition: arms
 frames:
-  - {id: arm, xyz: [1, 0, 0]}
+  - {id: arm}
   - {id: hand, parent: wrist}
 )")});
   CHECK(cycle.status == 2);

@@ -30,7 +30,7 @@ using testing::x_of;
 
 constexpr const char* kArms = R"(partition: arms
 frames:
-  - {id: arm, xyz: [1, 0, 0]}
+  - {id: arm}
   - {id: hand, parent: arm, xyz: [10, 0, 0]}
 )";
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -72,7 +74,12 @@ TEST_CASE("a node opens a state and a configuration of format 2 repeatedly") {
   NodeOptions options;
   options.state = directory.path();
   options.discovery = Milliseconds(0);
-  const auto config = load_config(kFixture + "/arms.yaml");
+  std::ifstream file(kFixture + "/arms.yaml");
+  std::string text((std::istreambuf_iterator<char>(file)), {});
+  // A pose of a root is rejected since.
+  const std::string pose = "xyz: [1, 0, 0], ";
+  text.erase(text.find(pose), pose.size());
+  const auto config = parse_config(text, kFixture + "/arms.yaml");
   REQUIRE(config);
   options.history = config->history;
   for (int round = 0; round < 2; ++round) {

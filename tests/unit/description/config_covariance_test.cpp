@@ -59,7 +59,7 @@ TEST_CASE("a file gives the covariance of frames without their own") {
 }
 
 TEST_CASE("a frame without a covariance is unspecified") {
-  const auto config = parsed("frames:\n  - {id: odom, xyz: [1, 0, 0]}\n");
+  const auto config = parsed("frames:\n  - {id: odom, parent: map, xyz: [1, 0, 0]}\n");
   REQUIRE(config);
   CHECK(config->frames[0].X_PC.covariance == kNothing);
 }

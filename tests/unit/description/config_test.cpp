@@ -1,5 +1,6 @@
 #include "tfdude/description/config.hpp"
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -312,6 +313,13 @@ TEST_CASE("an invalid value is rejected by field") {
               "0, 0, 0, 0, 0, 0, 0, 0]"),
        Errc::kInvalidInput,
        "robot.yaml:4: frame 'camera': stddev and cov are both given, one is enough"});
+  for (const char* pose :
+       {"xyz: [0, 0, 1]", "rpy: [0, 0, 1]", "quat: [0, 0, 0, 1]", "geodetic: [48, 11, 500]"}) {
+    const std::string key(pose, std::strchr(pose, ':'));
+    check_refused({camera(std::string("    ") + pose), Errc::kConfig,
+                   "robot.yaml:4: frame 'camera': " + key +
+                       " needs parent: it places the frame in that one"});
+  }
   check_refused({camera("    parent: ''"), Errc::kInvalidInput,
                  "robot.yaml:4: frame 'camera': parent is empty"});
   check_refused({"frames: [{id: \"a\\nb\"}]", Errc::kInvalidInput,

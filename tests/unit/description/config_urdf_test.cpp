@@ -72,6 +72,20 @@ TEST_CASE("control characters of a configuration do not reach the error message"
   }
 }
 
+TEST_CASE("a robot of a URDF stands at a latitude and longitude") {
+  const std::string head = "urdf:\n  - {file: ur5e.urdf, root: earth, ";
+  const std::string folder = TFDUDE_EXAMPLES "/robots/f.yaml";
+  const auto config =
+      tfdude::parse_config(head + "geodetic: [48.137154, 11.576124, 519]}\n", folder);
+  REQUIRE(config.has_value());
+  const auto frame = tfdude::parse_config(
+      "frames:\n  - {id: a, parent: earth, geodetic: [48.137154, 11.576124, 519]}\n", folder);
+  REQUIRE(frame.has_value());
+  const tfdude::FrameSpec& root = config->frames.front();
+  CHECK(root.parent == "earth");
+  CHECK(log(root.X_PC.pose.inverse() * frame->frames.front().X_PC.pose).norm() < 1e-9);
+}
+
 TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   const std::string folder = TFDUDE_EXAMPLES "/robots/";
   const auto refused = [&](const std::string& text, const std::string& message) {
@@ -88,9 +102,12 @@ TEST_CASE("an invalid entry for a URDF is rejected by name and line") {
   refused("urdf: [{file: x.urdf}]\n",
           "1: urdf[0]: " + folder + "x.urdf: cannot be opened: No such file or directory");
   entry("spam: 1",
-        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, matrix, stddev, cov, "
-        "covariance, prefix, links, strict_limits, joints");
+        ": unknown key 'spam'; known are file, root, xyz, rpy, quat, matrix, geodetic, "
+        "stddev, cov, covariance, prefix, links, strict_limits, joints");
   entry("rpy: [0, 0, 0]", ": rpy needs root: it places the root link in that frame");
+  entry("geodetic: [48, 11, 0]", ": geodetic needs root: it places the root link in that frame");
+  entry("root: w, geodetic: [48, 11, 0], xyz: [0, 0, 0]",
+        ": geodetic is given beside xyz or matrix, one is enough");
   entry("root: ''", ": root is empty");
   entry("root: w, xyz: [1, 2]", ": xyz has 2, not 3 numbers");
   entry("prefix: [a]", ": prefix is not text");
