@@ -182,9 +182,9 @@ class TwoWays {
     const Covariance A = mapped(a_.gains[in_a], of_a.own);
     const Covariance B = mapped(b_.gains[in_b], of_b.own);
     if (is_tied(of_a) || is_tied(of_b)) {
-      add_unknown(A);
-      add_unknown(B);
-      of_a.own = of_b.own = {};
+      // What the observation subtracts is of the own part, so one of both values stays whole.
+      const bool keeps_a = is_tied(of_a);
+      take_whole(keeps_a ? b_ : a_, keeps_a ? in_b : in_a);
       return;
     }
     const BoundWeights weights = bound_weights(A, B);
@@ -194,6 +194,20 @@ class TwoWays {
   static bool is_tied(const Belief& X) {
     return std::any_of(X.common_errors.begin(), X.common_errors.end(),
                        [](const CommonError& one) { return one.subtracts; });
+  }
+
+  // All that the edge has, but for named sources: as large as before any observation.
+  void take_whole(Way& way, std::size_t i) {
+    Belief& X = way.edges[i].X_PC;
+    Matrix6d sigma = X.own.matrix();
+    for (const CommonError& one : X.common_errors) {
+      if (is_observed(one) && !one.subtracts) sigma += one.loading * one.loading.transpose();
+    }
+    add_unknown(mapped(way.gains[i], Covariance::trusted(sigma)));
+    X.own = {};
+    X.common_errors.erase(
+        std::remove_if(X.common_errors.begin(), X.common_errors.end(), is_observed),
+        X.common_errors.end());
   }
 
   void take_unknown(Way& way, std::size_t i) {

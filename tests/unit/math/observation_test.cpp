@@ -167,8 +167,8 @@ TEST_CASE("Columns that are dropped make the joint covariance larger and never s
   CHECK((chain.dense() - P).cwiseAbs().maxCoeff() > 1e-6 * P.cwiseAbs().maxCoeff());
 }
 
-// What a path has in common is that of its derivatives where it was observed. Each observation moves
-// it a little, and that must not be taken for information about what was never measured.
+// What a path has in common is that of its derivatives where it was observed. Each observation
+// moves it a little, and that must not be taken for information about what was never measured.
 TEST_CASE("A bent path that is observed again says no more about its edges") {
   const auto stddev = [](double metres, double radians) {
     return *Covariance::from_stddev({metres, metres, metres, radians, radians, radians});
