@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include <Eigen/Eigenvalues>
 
 #include "math/common_errors.hpp"
 #include "math/square_root.hpp"
@@ -70,37 +67,6 @@ bool JointPrior::is_tied() const {
     const auto has = [](const Loading& loading) { return !loading.isZero(0); };
     return std::count_if(source.loadings.begin(), source.loadings.end(), has) > 1;
   });
-}
-
-void JointPrior::align(const std::vector<Matrix6d>& H) {
-  // Of the columns, in deviations of the own parts: what moves of less than a tenth of a radian, or
-  // of a path's length, may have changed.
-  constexpr double kMoved = 0.1;
-  constexpr double kRounding = 1e-9;
-  Loading left(6, 0);
-  for (const Source& source : sources_) {
-    if (source.subtracts) left = joined(left, source.on_path(*this, H));
-  }
-  const Factor S(own_on_path(H));
-  if (left.cols() == 0 || S.rank() == 0) return;
-  // More than the own parts have: other sources were observed, too.
-  if ((S.whitening() * left).operatorNorm() > 1 + kRounding) return;
-  std::vector<Source> aligned = sources_;
-  double moved = 0;
-  double whole = 0;
-  for (std::size_t i = 0; i < edges_.size(); ++i) {
-    const Loading on_path = H[edges_[i]] * own_roots_[i];
-    const Loading gain = own_roots_[i] * (S.whitening() * on_path).transpose() * S.whitening();
-    const Whitening in_deviations = Factor(own_roots_[i]).whitening();
-    for (std::size_t k = 0; k < sources_.size(); ++k) {
-      if (!sources_[k].subtracts) continue;
-      const Loading& loading = sources_[k].loadings[i];
-      aligned[k].loadings[i] = gain * sources_[k].on_path(*this, H);
-      moved += (in_deviations * (aligned[k].loadings[i] - loading)).squaredNorm();
-      whole += (in_deviations * loading).squaredNorm();
-    }
-  }
-  if (moved <= kMoved * kMoved * whole) sources_ = std::move(aligned);
 }
 
 Loading JointPrior::marginal(std::size_t i) const {

@@ -60,11 +60,6 @@ class JointPrior {
   /// Whether errors of several edges are correlated.
   [[nodiscard]] bool is_tied() const;
 
-  /// What an earlier observation of this path has left is turned to the path's derivatives where it
-  /// is now: F = own Hᵀ M for some M. The edges have moved a little since, and what differs by that
-  /// would be taken for information. Columns of other observations stay.
-  void align(const std::vector<Matrix6d>& H);
-
   /// A root of P_ii.
   [[nodiscard]] Loading marginal(std::size_t i) const;
 

@@ -47,7 +47,6 @@ class Update {
   Result<Observation> run() {
     turn_to(at_start().X_AB);
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
-    if (prior_.is_tied()) prior_.align(at_start().H);
     // Parts that may be correlated are judged by their bound.
     PathMinimum found = first_minimum();
     for (int i = 1; i < kMostTurns && turns(found); ++i) {

@@ -183,7 +183,7 @@ TEST_CASE("A bent path that is observed again says no more about its edges") {
   noise << 1, -1, 1, 1, -1, 1;
   Matrix6d first;
   int count = 0;
-  for (const double deviations : {0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0}) {
+  for (const double deviations : {0.0, 1.0, -1.0}) {
     const Transform Z{Z_AB * exp(Twist(1e-4 * deviations * noise)), stddev(1e-4, 1e-4)};
     const auto found = observe(edges, Z, kSource, {});
     REQUIRE(found);
