@@ -16,6 +16,16 @@ std::size_t items_of(const Page& page) {
 
 std::size_t items_of_all(const Page& page) { return items_of(page) + page.others.size(); }
 
+// @param function  called with each id of a kept page
+template <class Function>
+void for_each_id(const std::string& ids, Function function) {
+  for (std::size_t at = 0; at < ids.size();) {
+    const std::size_t size = static_cast<unsigned char>(ids[at]);
+    function(std::string_view(ids.data() + at + 1, size));
+    at += 1 + size;
+  }
+}
+
 }  // namespace
 
 Directory::Directory(Forest& forest, std::string own)
@@ -88,7 +98,7 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
     partition.successor.reset();
   }
   if (incarnation == partition.incarnation) return nullptr;
-  if (partition.pages.empty()) {
+  if (partition.pages.empty() && !partition.successor) {
     partition.incarnation = incarnation;
     partition.epoch = partition.awaited_epoch = 0;
     partition.page_count = 0;
@@ -280,14 +290,32 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
                                 std::uint32_t number) {
   const auto there = partition.pages.find(number);
   if (there == partition.pages.end()) return;
-  const std::string& ids = there->second.ids;
-  for (std::size_t at = 0; at < ids.size();) {
-    const std::size_t size = static_cast<unsigned char>(ids[at]);
-    const std::string_view id(ids.data() + at + 1, size);
-    at += 1 + size;
-    if (stays.count(id) != 0) continue;
+  for_each_id(there->second.ids, [&](std::string_view id) {
+    if (stays.count(id) != 0) return;
     if (claims_.unclaim(std::string(id), owner, number)) --partition.info.frames;
+  });
+}
+
+// What has come of the latest process, as it was published.
+Directory::Successor Directory::structure_of(const Known& partition, Owner owner) {
+  if (partition.successor && partition.successor->incarnation == partition.live) {
+    return *partition.successor;
   }
+  Successor structure{partition.live, {}, {}, 0};
+  if (partition.incarnation != partition.live) return structure;
+  for (const auto& [number, kept] : partition.pages) {
+    Page page{partition.info.name, number, partition.live, kept.epoch, {}, kept.tombstones};
+    for_each_id(kept.ids, [&, number = number](std::string_view id) {
+      const auto claim = claims_.claim_of(std::string(id), owner);
+      if (!claim || claim->page != number) return;
+      page.entries.push_back({std::string(id), claim->parent, claim->lamport_time});
+    });
+    if (kept.epoch == partition.awaited_epoch) page.others = partition.awaited;
+    page.joints = kept.joints;
+    structure.items += items_of_all(page);
+    structure.pages.emplace(number, std::move(page));
+  }
+  return structure;
 }
 
 void Directory::saw_lamport_time(std::uint64_t time) {

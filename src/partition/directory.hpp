@@ -230,7 +230,8 @@ class Directory {
     std::size_t items = 0;
   };
 
-  /// A new incarnation of a partition with a known structure, until all its pages have come.
+  /// A new incarnation of a partition with a known structure, until all its pages have come. Or one
+  /// that a participant without a voice has taken for forgotten, until it returns.
   struct Successor {
     std::uint64_t incarnation = 0;
     std::optional<std::uint32_t> page_count;  // from its presence
@@ -291,6 +292,8 @@ class Directory {
   void hear_forgotten(Known& partition, const Absent& one, bool news);
   void forget_if_gone(Known& partition, Time since);
   void hear_of_itself(const std::vector<Absent>& absent);
+  /// Whether this participant tells others what it knows of absent partitions.
+  [[nodiscard]] bool has_voice() const { return !partitions_.front().info.name.empty(); }
   [[nodiscard]] std::optional<Absent> told_absence(const Known& partition) const;
   /// Whether an absent partition may claim what is held here, or was removed here.
   [[nodiscard]] bool may_contest(const std::string& partition) const;
@@ -299,6 +302,7 @@ class Directory {
   void mark_absent(Known& partition, Owner owner, bool stopped, Time now,
                    std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
+  [[nodiscard]] Successor structure_of(const Known& partition, Owner owner);
   void tell_claims();
   static Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);

@@ -27,8 +27,7 @@ void end_silences(Partitions& partitions, const Absences& absences) {
 // What this participant knows of an absent partition, if it tells others: one without a partition
 // cannot.
 std::optional<Absent> Directory::told_absence(const Known& partition) const {
-  const bool has_voice = !partitions_.front().info.name.empty();
-  return has_voice ? absences_.find(partition.info.name) : std::nullopt;
+  return has_voice() ? absences_.find(partition.info.name) : std::nullopt;
 }
 
 // Nothing is known of one that this process has not met. One that was forgotten must hear of it.
@@ -46,11 +45,12 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   // number.
   const bool is_told = told_absence(partition).has_value();
   if (!is_told && !partition.info.reachable) {
-    // Others may not say again that they have forgotten it.
-    if (partition.forgotten)
+    const bool kept = partition.successor && partition.successor->incarnation == incarnation;
+    // Others may not say again that they have forgotten it. What was kept they have not forgotten.
+    if (partition.forgotten && !kept)
       partition.to_forget = std::max(partition.to_forget, partition.heard_of);
     partition.live = partition.heard_of = 0;
-    partition.successor.reset();
+    if (!kept) partition.successor.reset();
     return false;
   }
   if (is_told) absences_.relied_on(partition.info.name);
@@ -220,11 +220,17 @@ void Directory::hear_forgotten(Known& partition, const Absent& one, bool news) {
 
 // A participant that forgot the partition may not have heard of its latest process, which was heard
 // here and is gone, too. A process that is silent for a moment only may have been started since.
+// Nobody tells it that a participant without a voice has taken it for forgotten: it goes on as the
+// same process, whose pages do not come again, so they are kept.
 void Directory::forget_if_gone(Known& partition, Time since) {
   if (!partition.to_forget_all || partition.info.reachable) return;
   const auto absence = absences_.find(partition.info.name);
   if (absence && absence->kind == Absent::Kind::kSilent) return;
+  const Owner owner = refer_to(partition.info.name);
+  std::optional<Successor> kept;
+  if (!has_voice()) kept = structure_of(partition, owner);
   (void)forget(partition.info.name, std::max(partition.live, partition.heard_of), since);
+  partition.successor = std::move(kept);
 }
 
 void Directory::restore(const std::vector<Absent>& absent) {
@@ -287,6 +293,7 @@ void Directory::drop_structure(Known& partition, Owner owner) {
   partition.awaited.clear();
   partition.successor.reset();
   partition.page_count = 0;
+  partition.incarnation = 0;
 }
 
 std::uint64_t Directory::latest_incarnation(const std::string& partition) const {

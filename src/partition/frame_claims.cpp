@@ -50,6 +50,12 @@ FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) {
   return mine != claims->second.end() ? &*mine : nullptr;
 }
 
+std::optional<FrameClaim> FrameClaims::claim_of(const std::string& id, Owner owner) {
+  if (const FrameClaim* mine = shadowed(id, owner)) return *mine;
+  const auto there = forest_.info(id);
+  return there && there->owner == owner ? std::optional(in_force(*there)) : std::nullopt;
+}
+
 bool FrameClaims::is_ended(const std::string& id, const FrameClaim& claim) const {
   return removals_.find(id, claim.owner, claim.lamport_time, [&](const FrameRemoval& one) {
     const bool counts = one.by_request || succession_.is_gone(claim.owner);
@@ -66,9 +72,7 @@ const FrameClaim* FrameClaims::winning_claim(const std::string& id, Claims claim
 
 bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) {
   const auto there = forest_.info(id);
-  std::optional<FrameClaim> before;
-  if (there && there->owner == claim.owner) before = in_force(*there);
-  if (const FrameClaim* mine = shadowed(id, claim.owner)) before = *mine;
+  const auto before = claim_of(id, claim.owner);
   // A late page: the frame has left it since.
   const bool late =
       before && before->page != claim.page && before->lamport_time > claim.lamport_time;

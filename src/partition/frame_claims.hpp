@@ -83,6 +83,9 @@ class FrameClaims {
   /// @return whether the claim is gone
   bool unclaim(const std::string& id, Owner owner, std::uint32_t page);
 
+  /// The partition's claim to the frame, whether it is in force or not. O(1).
+  [[nodiscard]] std::optional<FrameClaim> claim_of(const std::string& id, Owner owner);
+
   /// A partition has removed or dropped a frame. O(1).
   void removed(const std::string& id, const FrameRemoval& removal);
   /// The page of the partition no longer says that.

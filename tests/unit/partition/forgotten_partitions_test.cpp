@@ -162,6 +162,79 @@ TEST_CASE("a partition is forgotten with a later process that only some have hea
   }
 }
 
+// Nobody has told the process of it, so it does not send its pages again.
+TEST_CASE("a client that has taken a silent process for forgotten has its structure again") {
+  Witness client("");
+  client.directory.apply(presence_of("arm", 2, 2), kNow);
+  Page first{"arm", 0, 2, 3, {{"hand", "", 10}, {"elbow", "", 11}}};
+  first.joints = {{"wrist", ""}};
+  const Page second{"arm", 1, 2, 4, {{"finger", "hand", 12}}, {}, {{0, 3}}};
+  const bool replaces = GENERATE(false, true);
+  if (replaces) {
+    // The structure of the earlier process holds until all pages have come.
+    client.directory.apply(first);
+  } else {
+    client.apply({first, second});
+  }
+  const auto before = client.structure();
+  Presence base = presence_of("base", 1, 0);
+  client.directory.apply(base, kNow);
+  base.absent = {{"arm", 0, Kind::kForgotten, 1}};
+  client.directory.apply(base, kNow);
+  client.lose("arm", 2);
+  CHECK_FALSE(client.directory.look_for_gone(kStart + Absences::kGrace / 2));
+  CHECK(client.directory.look_for_gone(kStart + Absences::kGrace));
+  CHECK(client.structure().empty());
+  CHECK_FALSE(client.directory.owner("arm"));
+  CHECK(client.directory.complete());
+  if (replaces) client.directory.apply(second);
+  SECTION("as it was") {
+    client.directory.apply(presence_of("arm", 2, 2), kNow);
+    CHECK(client.directory.complete());
+    CHECK(client.directory.epoch(*client.directory.owner("arm")) == 4);
+    CHECK(client.directory.route_joint("wrist"));
+    CHECK(client.structure().size() == 3);
+    if (!replaces) CHECK(client.structure() == before);
+    // The process has lived after that.
+    client.lose("arm", 2);
+    client.wait();
+    CHECK(client.owner_of("finger") == "arm");
+  }
+  SECTION("with what it has changed since") {
+    first.epoch = 5;
+    first.entries = {{"hand", "", 10}};
+    first.others = {{1, 4}};
+    client.directory.apply(first);
+    client.directory.apply(presence_of("arm", 2, 2), kNow);
+    CHECK(client.directory.complete());
+    CHECK(client.directory.epoch(*client.directory.owner("arm")) == 5);
+    CHECK(client.structure() ==
+          std::vector<std::string>{"finger < hand @ arm, attached", "hand <  @ arm"});
+  }
+  SECTION("also if they have forgotten it a second time") {
+    base.absent[0].since = 1;
+    client.directory.apply(base, kNow);
+    client.directory.apply(presence_of("arm", 2, 2), kNow);
+    CHECK(client.owner_of("finger") == "arm");
+  }
+  SECTION("but not if others forget that process, too") {
+    if (replaces) client.directory.apply(presence_of("arm", 2, 2), kNow);
+    base.absent[0] = {"arm", 1, Kind::kForgotten, 2};
+    client.directory.apply(base, kNow);
+    if (replaces) CHECK(client.directory.lost("arm", 2, kNow));
+    client.directory.apply(presence_of("arm", 2, 2), kNow);
+    CHECK(client.structure().empty());
+    CHECK_FALSE(client.directory.complete());
+  }
+  SECTION("but not if a later process is there") {
+    client.directory.apply(presence_of("arm", 3, 1), kNow);
+    CHECK(client.structure().empty() != replaces);
+    client.directory.apply(page_of("arm", {{"hand", "", 10}}, 3));
+    CHECK(client.structure().size() == 1);
+    CHECK(client.directory.complete());
+  }
+}
+
 TEST_CASE("an owner that restarts tells a returning partition that it was forgotten") {
   // The process knows the partition before it reads what its predecessor has stored.
   Witness base;
