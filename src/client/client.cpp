@@ -460,8 +460,11 @@ bool Client::exists(const std::string& id) { return participant_->queries().info
 
 Result<bool> Client::whether_exists(const std::string& id) {
   const auto info = participant_->queries().info(id);
-  if (!info && !is_unknown(info.error().code)) return tl::unexpected(info.error());
-  return info.has_value();
+  if (info) return true;
+  if (!is_unknown(info.error().code)) return tl::unexpected(info.error());
+  const auto all = participant_->queries().partitions();
+  if (all && all->empty()) return fail(Errc::kUnreachable, info.error().message);
+  return false;
 }
 
 Result<std::vector<Frame>> Client::frames() { return participant_->queries().frames(); }

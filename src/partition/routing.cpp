@@ -15,18 +15,23 @@ tl::unexpected<Error> unknown_frame(std::string_view id) {
   return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
 }
 
+// Of one that was only heard of, it may not be known since when.
+std::string not_reachable_since(const PartitionInfo& info) {
+  if (info.since == Time{}) return " is not reachable";
+  return " has not been reachable since " + to_string(info.since);
+}
+
 Result<void> check_reachable(const Directory& directory, Owner owner) {
   if (owner == kHeldHere || directory.reachable(owner)) return {};
   const PartitionInfo& info = directory.info(owner);
   const bool discovered = !info.host.empty();
   const std::string process =
       discovered ? " (host " + info.host + ", pid " + std::to_string(info.pid) + ")" : "";
-  return fail_about_partition(Errc::kUnreachable,
-                              "partition " + quote(info.name) + process +
-                                  " has not been reachable since " + to_string(info.since) +
-                                  (discovered ? "" : ", before this process started") + ": it " +
-                                  why_absent(info),
-                              info.name);
+  return fail_about_partition(
+      Errc::kUnreachable,
+      "partition " + quote(info.name) + process + not_reachable_since(info) +
+          (discovered ? "" : ", before this process started") + ": it " + why_absent(info),
+      info.name);
 }
 
 // The owner's part. If it does not exist yet, creates it with this id and an empty body of this

@@ -1,9 +1,11 @@
 #include "runtime/explanations.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/base/number.hpp"
 #include "tfdude/base/similar.hpp"
 
 #include "calls/lookup_in_progress.hpp"
@@ -79,6 +81,17 @@ void blame(const PartitionInfo& absent, Cause& cause) {
 }  // namespace
 
 Explanation Explanations::why(const std::string& a, const std::string& b, const WhyQuery& query) {
+  for (const double deviation : query.sensor) {
+    if (deviation >= 0 && std::isfinite(deviation)) continue;
+    Cause cause;
+    cause.error = {Errc::kInvalidInput,
+                   "a standard deviation of the sensor must be finite and not "
+                   "negative, not " +
+                       number_text(deviation)};
+    Explanation explanation;
+    explanation.cause = std::move(cause);
+    return explanation;
+  }
   const Deadline deadline = discovery_.call_deadline();
   const Milliseconds left = deadline.left();
   // The rest is for what explains the answer.
@@ -320,7 +333,9 @@ bool Explanations::explain_missed(const std::string& a, const std::string& b, Ca
 
 bool Explanations::has_other_clock(const Owners& owners, Cause& cause) {
   const Lock lock(structure_.mutex);
-  for (const std::string& name : owners.order) {
+  // A static edge holds for all times, of every clock.
+  for (const EdgeHistory& edge : owners.dynamic) {
+    const std::string& name = edge.partition;
     const auto owner = structure_.directory.owner(name);
     if (!owner || *owner == kHeldHere) continue;
     const auto clock = structure_.directory.info(*owner).clock;

@@ -424,4 +424,13 @@ TEST_CASE("nobody can say whether a frame of a partition that was lost before ex
   CHECK_FALSE(late.exists("nowhere"));
 }
 
+TEST_CASE("exists: where no partition answers nobody can say") {
+  const testing::Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  Client client = Client::open(join("")).value();
+  const auto exists = client.whether_exists("world");
+  REQUIRE_FALSE(exists);
+  CHECK(exists.error().code == Errc::kUnreachable);
+  CHECK_FALSE(client.exists("world"));
+}
+
 }  // namespace tfdude

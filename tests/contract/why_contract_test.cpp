@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -288,6 +290,35 @@ TEST_CASE("why: an edge without a sample is no cause if its first value holds") 
   INFO(why.cause->error.message << "; " << why.cause->needs);
   CHECK(why.cause->obstacle == Obstacle::kNoCommonInstant);
   CHECK(why.cause->frame != "middle_pivot");
+}
+
+TEST_CASE("why: the clock of an owner without a dynamic edge on the path is no cause") {
+  const auto join = testing::join_loopback();
+  const Node base =
+      Node::open(join("base"), "base", {{"world", "", {}}, {"base", "world", Transform()}}).value();
+  NodeOptions options;
+  options.clock = ClockKind::kExternal;
+  const Node sim =
+      Node::open(join("sim"), "sim", {{"mount", "base", Transform::exact({})}}, options).value();
+  Client client = Client::open(join("")).value();
+  REQUIRE(client.update("base", Transform::exact({}), instant(0)));
+  REQUIRE(testing::eventually([&] { return client.lookup("world", "mount").has_value(); }));
+  WhyQuery query;
+  query.at = instant(500);
+  const Explanation why = client.why("world", "mount", query);
+  REQUIRE(why.cause);
+  INFO(why.cause->error.message << "; " << why.cause->needs);
+  CHECK(why.cause->obstacle == Obstacle::kEndsBefore);
+  CHECK(why.cause->partition == "base");
+}
+
+TEST_CASE("why: a sensor that is worse than none, or no number, is rejected") {
+  Client client = Client::open(testing::join_loopback()("")).value();
+  WhyQuery query;
+  query.sensor[4] = GENERATE(-1.0, std::nan(""), std::numeric_limits<double>::infinity());
+  const Explanation why = client.why("world", "base", query);
+  REQUIRE(why.cause);
+  CHECK(why.cause->error.code == Errc::kInvalidInput);
 }
 
 TEST_CASE("why: an owner that hangs is named, soon") {
