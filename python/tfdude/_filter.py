@@ -76,17 +76,21 @@ class MessageFilter(Generic[Message]):
             raise ValueError("the filter is closed")
         if len(self._waiting) >= self._most:
             self._collect()
-        self._key += 1
-        key = self._key
+            if self._ready:
+                self._mailbox.wake()  # whoever waits for what was taken here
         entry = _Waiting(message)
-        self._waiting[key] = entry
+        with self._collecting:
+            self._key += 1
+            key = self._key
+            self._waiting[key] = entry
         max_age, *rest = self._query
         try:
             entry.lookup = self._client._start_lookup(
                 self._mailbox, key, self._target, frame, stamp, max_age, *rest
             )
         except BaseException:
-            self._waiting.pop(key, None)
+            with self._collecting:
+                self._waiting.pop(key, None)
             raise
         with self._collecting:
             if len(self._waiting) <= self._most:

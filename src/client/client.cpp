@@ -463,7 +463,8 @@ Result<bool> Client::whether_exists(const std::string& id) {
   if (info) return true;
   if (!is_unknown(info.error().code)) return tl::unexpected(info.error());
   const auto all = participant_->queries().partitions();
-  if (all && all->empty()) return fail(Errc::kUnreachable, info.error().message);
+  if (!all) return tl::unexpected(all.error());
+  if (all->empty()) return fail(Errc::kUnreachable, info.error().message);
   return false;
 }
 

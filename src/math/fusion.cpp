@@ -79,10 +79,16 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
   if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
   if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
   const double reach = reach_of(estimates);
-  Pose X = estimates.front().pose;
+  // What knows nothing of a rotation would cost the others their digits.
+  std::size_t first = 0;
+  for (std::size_t k = estimates.size(); k-- > 0;) {
+    if (unknown_rotations(estimates[k].covariance.of_specified()) == 0) first = k;
+  }
+  Pose X = estimates[first].pose;
   for (int iteration = 1; iteration <= kMostFusions; ++iteration) {
-    Gaussian sum = seen_from(X, estimates.front());
-    for (std::size_t k = 1; k < estimates.size(); ++k) {
+    Gaussian sum = seen_from(X, estimates[first]);
+    for (std::size_t k = 0; k < estimates.size(); ++k) {
+      if (k == first) continue;
       if (!merge(sum, seen_from(X, estimates[k]), reach)) {
         return fail(Errc::kInvalidInput,
                     "estimate " + std::to_string(k) +

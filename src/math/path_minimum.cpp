@@ -51,7 +51,8 @@ class Descent {
 
   PathMinimum run() {
     if (prior_.is_tied()) {
-      if (auto found = with_first_derivatives()) return *std::move(found);
+      auto found = with_first_derivatives();
+      if (found && found->cost() <= kDoubtful * found->S.rank()) return *std::move(found);
     }
     start();
     const PathMinimum at_start = here();

@@ -9,6 +9,9 @@ namespace {
 
 // π²/3 [rad²], of an angle that is anywhere.
 constexpr double kAnywhere = 3.289868133696453;
+// Instead of what was stated [rad²]: the rotation is that of the path, and must not confirm it, how
+// often it may be measured.
+constexpr double kNothing = 1e6;
 
 struct RotationAxes {
   Eigen::Matrix3d axes;  // columns, those that are known first
@@ -61,7 +64,7 @@ Transform with_one_turn(const Transform& Z_AB, const RotationAxes& of,
       Eigen::Matrix3d::Identity() - by * by.transpose() / by.squaredNorm();
   Matrix6d all = Matrix6d::Zero();
   all.topLeftCorner<3, 3>() = turned.transpose() * R.topLeftCorner<3, 3>() * turned;
-  all.bottomRightCorner<3, 3>() = of.variances[0] * by * by.transpose() + of.variances[1] * across;
+  all.bottomRightCorner<3, 3>() = of.variances[0] * by * by.transpose() + kNothing * across;
   all.topRightCorner<3, 3>() = turned.transpose() * R.topRightCorner<3, 3>() * w * by.transpose();
   all.bottomLeftCorner<3, 3>() = all.topRightCorner<3, 3>().transpose();
   return turned_by(Z_AB, T, all);
@@ -80,7 +83,13 @@ Transform with_unknown_rotation_of(const Pose& X_AB, const Transform& Z_AB) {
   const Eigen::Matrix3d turned = T.toRotationMatrix();
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = turned.transpose();
-  return turned_by(Z_AB, T, turn * Z_AB.covariance.of_specified().matrix() * turn.transpose());
+  // Along the axes that are known nothing changes; along the others nothing is left.
+  Matrix6d known = Matrix6d::Identity();
+  const Eigen::MatrixXd unknown = of.axes.rightCols(3 - of.known);
+  known.bottomRightCorner<3, 3>() -= unknown * unknown.transpose();
+  Matrix6d R = known * Z_AB.covariance.of_specified().matrix() * known;
+  R.bottomRightCorner<3, 3>() += kNothing * unknown * unknown.transpose();
+  return turned_by(Z_AB, T, turn * R * turn.transpose());
 }
 
 }  // namespace tfdude

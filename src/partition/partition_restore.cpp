@@ -1,4 +1,8 @@
 #include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "tfdude/base/id.hpp"
 
@@ -26,24 +30,26 @@ FrameSpec as_left(FrameSpec frame, const std::vector<StoredJoint>& joints) {
 }
 
 // Of an edge whose joint says its value anew: what was observed before has the same error.
-StoredCorrelation with_unknown(const StoredCorrelation& stored) {
-  StoredCorrelation correlation{stored.said, Correlation(), {}};
+StoredCorrelation with_unknown(const Correlation& said) {
+  StoredCorrelation correlation{said, Correlation(), {}};
   correlation.observed->unknown = true;
   return correlation;
 }
 
-// Of these frames, what was stored of those that were observed, and are where their joints were.
-std::vector<const StoredFrame*> observed_joints(const StoredState& state,
-                                                const std::vector<FrameSpec>& frames,
-                                                const std::vector<StoredJoint>& joints) {
-  const auto all = by_id(frames);
-  std::vector<const StoredFrame*> observed;
+// Those of these frames that were observed, and are where their joints were left.
+std::vector<const FrameSpec*> observed_joints(const std::vector<FrameSpec>& frames,
+                                              const StoredState& state,
+                                              const std::vector<StoredJoint>& joints) {
+  std::set<std::string_view> observed;
   for (const StoredFrame& frame : state.frames) {
-    const auto found = all.find(frame.id);
-    if (!frame.correlation.observed || found == all.end() || !found->second->joint) continue;
-    if (left_of(*found->second->joint, joints)) observed.push_back(&frame);
+    if (frame.correlation.observed) observed.insert(frame.id);
   }
-  return observed;
+  std::vector<const FrameSpec*> found;
+  for (const FrameSpec& frame : frames) {
+    if (!frame.joint || observed.count(frame.id) == 0) continue;
+    if (left_of(*frame.joint, joints)) found.push_back(&frame);
+  }
+  return found;
 }
 
 // Whether the joint says the pose that it said before the edge was observed.
@@ -72,7 +78,7 @@ std::vector<StoredFrame> frames_of(const StoredState& state, const std::vector<S
       frame.correlation.observed.reset();
     } else if (frame.correlation.observed) {
       if (says_as_before(frame, X_PC.pose)) continue;
-      frame.correlation = with_unknown(frame.correlation);
+      frame.correlation = with_unknown(frame.correlation.said);
     }
     frame.X_PC = X_PC;
   }
@@ -181,7 +187,7 @@ Result<void> Partition::reconfigure(const StoredState& state,
     }
   }
   if (auto taken = take(fresh, directory_.next_lamport_time(now)); !taken) return taken;
-  for (const StoredFrame* frame : observed_joints(state, fresh, joints)) {
+  for (const FrameSpec* frame : observed_joints(fresh, state, joints)) {
     (void)forest_.resume(frame->id, with_unknown(frame->correlation), {});
   }
   for (const std::string& id : dropped) tell_dropped(id);

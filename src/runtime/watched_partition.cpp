@@ -117,7 +117,8 @@ void WatchedPartition::forget_all() {
   groups_.clear();
   known_.clear();
   frames_.clear();
-  post_frames();
+  frames_due_ = false;
+  post({name_, FramesNews()});
 }
 
 void WatchedPartition::became_unreachable(std::string why) {

@@ -127,11 +127,11 @@ int main(int argc, char** argv) {
   std::optional<Client> client;
   std::string partition;
   if (argc > 4) {
-    const auto config = load_config(argv[4]);
-    partition = config->partition;
-    client.emplace(*Node::open(partition, config->frames, options));
+    const Config config = load_config(argv[4]).value();
+    partition = config.partition;
+    client.emplace(Node::open(partition, config.frames, options).value());
   } else {
-    client.emplace(*Client::open(options));
+    client.emplace(Client::open(options).value());
   }
   if (!testing::eventually([&] { return sees_all(*client); })) return 3;
   std::puts("ready");

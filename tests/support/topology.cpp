@@ -26,7 +26,8 @@ std::string PartitionSpec::yaml() const {
   out << std::setprecision(17) << "partition: " << name << "\nframes:\n";
   for (const FrameSpec& frame : frames) {
     out << "  - id: " << frame.id << "\n";
-    if (!frame.parent.empty()) out << "    parent: " << frame.parent << "\n";
+    if (frame.parent.empty()) continue;
+    out << "    parent: " << frame.parent << "\n";
     const Eigen::Vector3d t = frame.X_PC.pose.translation();
     const Eigen::Vector4d q = frame.X_PC.pose.rotation().coeffs();  // x, y, z, w
     write_list(out, "xyz", t);
