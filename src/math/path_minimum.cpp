@@ -73,9 +73,9 @@ class Descent {
   enum class Step { kMore, kLast, kStuck };
 
   // An earlier observation has tied the errors of edges as its derivatives say. The minimum follows
-  // the bend of the path along what was never measured, and would take that for information. So the
-  // derivatives stay those of the estimate, as in a filter with first-estimates Jacobians (Huang,
-  // Mourikis & Roumeliotis 2010), and only what the measurement shows is found anew.
+  // the bend of the path along what was never measured, and would take that for information. So it
+  // is found with the derivatives at the estimate, as in a filter with first-estimates Jacobians
+  // (Huang, Mourikis & Roumeliotis 2010). What the measurement ties follows those where it ends.
   std::optional<PathMinimum> with_first_derivatives() {
     constexpr int kMostSteps = 30;
     start();
@@ -88,8 +88,11 @@ class Descent {
       linear_ = linearize(all_, at_.xi, Z_AB_);
       linear_.H = H;
       now = here();
-      now.converged = converged;
-      if (converged) return now;
+      if (!converged) continue;
+      linear_ = linearize(all_, at_.xi, Z_AB_);
+      now = here();
+      now.converged = true;
+      return now;
     }
     return std::nullopt;
   }
