@@ -19,6 +19,7 @@
 namespace tfdude::cli {
 namespace {
 
+using testing::Approx;
 using testing::ContainsSubstring;
 
 Transform known_to(double deviation, double x = 1) {
