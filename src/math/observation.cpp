@@ -45,7 +45,7 @@ class Update {
         merge_(merge) {}
 
   Result<Observation> run() {
-    turn_to(at_start().X_AB);
+    if (unknown_rotations_ > 0) turn_to(at_start().X_AB);
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
     // Parts that may be correlated are judged by their bound.
     PathMinimum found = first_minimum();
@@ -83,7 +83,6 @@ class Update {
     return independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
   }
   void turn_to(const Pose& X_AB) {
-    if (unknown_rotations_ == 0) return;
     const Transform turned = with_unknown_rotation_of(X_AB, {Z_AB_, R_});
     Z_AB_ = turned.pose;
     R_ = turned.covariance.of_specified();

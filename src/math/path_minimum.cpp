@@ -86,13 +86,13 @@ class Descent {
       const bool converged = is_small(next);
       at_ = std::move(next);
       linear_ = linearize(all_, at_.xi, Z_AB_);
+      if (converged) {
+        now = here();
+        now.converged = true;
+        return now;
+      }
       linear_.H = H;
       now = here();
-      if (!converged) continue;
-      linear_ = linearize(all_, at_.xi, Z_AB_);
-      now = here();
-      now.converged = true;
-      return now;
     }
     return std::nullopt;
   }
