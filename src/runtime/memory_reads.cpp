@@ -301,13 +301,18 @@ Result<StampedTransform> MemoryReads::last_known(const std::string& a, const std
   std::set<Owner> named;
   const Lock lock(structure_.mutex);
   const Lock owners(mutex_);
+  // A caller may be here before look_again() is: at a death, or if an owner did not respond.
+  drop_kept();
+  const auto now = Clock::now();
   for (const Segment& segment : *segments) {
     const auto kept = memories_.find(segment.owner);
-    if (kept == memories_.end() || !kept->second.lost || !named.insert(segment.owner).second) {
-      continue;
-    }
+    if (segment.owner == kHeldHere || !named.insert(segment.owner).second) continue;
+    if (kept == memories_.end()) return fail(Errc::kUnreachable, {});  // another process serves it
+    const auto known = owners_.find(segment.owner);
+    const bool attached = known != owners_.end() && known->second.state == Known::State::kAttached;
+    if (attached && !kept->second.lost) continue;
     X_AB->basis.lost.push_back(
-        {structure_.directory.name(segment.owner), Clock::now() - *kept->second.lost});
+        {structure_.directory.name(segment.owner), now - kept->second.lost.value_or(now)});
   }
   return X_AB;
 }

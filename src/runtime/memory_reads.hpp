@@ -78,7 +78,8 @@ class MemoryReads {
   }
   /// The reply of an owner to a request for segments, if it can be read.
   [[nodiscard]] std::optional<Reply> read(const Request& request);
-  /// As lookup(); of owners that are gone, the last values. The answer names them.
+  /// As lookup(); of owners that are gone or do not respond, the last values. The answer names
+  /// them; if another process serves one of them meanwhile, there is none.
   [[nodiscard]] Result<StampedTransform> last_known(const std::string& a, const std::string& b,
                                                     const Query& query);
   /// Whether there is anything to read.
