@@ -27,8 +27,22 @@ Belief belief_of(const Sample& sample, const Correlation* said) {
   return belief;
 }
 
+// Whether an observation has found the second sample elsewhere than where the first one and the way
+// between both lead.
+bool is_found_elsewhere(const Sample& before, const Sample& after) {
+  if (after.revision() == nullptr || !after.revision()->row.observed) return false;
+  constexpr double kRounding = 1e-9;
+  const Pose way = given(before).pose.inverse() * given(after).pose;
+  const Pose led = before.value_pose() * way;
+  const Pose there = after.value_pose();
+  const double by = (led.translation() - there.translation()).norm();
+  return by > kRounding * (1.0 + there.translation().norm()) ||
+         led.rotation().angularDistance(there.rotation()) > kRounding;
+}
+
 // Whether an observation has corrected the second sample, but not the first.
 bool is_corrected_alone(const Sample& before, const Sample& after, const Correlation* said) {
+  if (is_found_elsewhere(before, after)) return true;
   const Correlation* second = correlation_at(after, said);
   if (second == nullptr) return false;
   const Correlation* first = correlation_at(before, said);

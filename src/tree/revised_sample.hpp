@@ -36,7 +36,7 @@ struct Walk {
 
 /// The value of an edge that drifts, between two samples: that of the first one, and what the drift
 /// has added since. If an observation has corrected the second sample, but not the first, a bound:
-/// that of interpolate_observed().
+/// that of interpolate_observed(). The pose then leads from one to the other, without a jump.
 /// @param walk  from the first sample to the second
 [[nodiscard]] CorrelatedValue drifted_between(const Sample& before, const Sample& after, double s,
                                               const Correlation* said, const Walk& walk);

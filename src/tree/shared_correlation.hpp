@@ -117,7 +117,7 @@ class SharedRevision {
         arena_(&arena) {}
 
   const Transform given;
-  const RowInfo row;  ///< for the owner only
+  const RowInfo row;  ///< for the owner only, except for `observed`
   [[nodiscard]] const Correlation& correlation() const { return *shared_; }
   [[nodiscard]] const FlatCorrelation* const& flat() const { return shared_.flat(); }
   [[nodiscard]] std::size_t bytes() const { return sizeof(*this) + shared_.bytes(); }

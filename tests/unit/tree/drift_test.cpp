@@ -254,6 +254,41 @@ TEST_CASE("drift: between a sample and a corrected one there is a bound") {
   CHECK(std::sqrt(X->covariance.of_specified().upper()[0]) > before);
 }
 
+TEST_CASE("drift: the pose does not jump where the edge alone was observed, once and again") {
+  Drifting robot;
+  for (int step = 0; step < 5; ++step) {
+    robot.G = shift(0.3 * step);
+    robot.drive(step);
+    if (step != 2 && step != 4) continue;
+    const auto seen = robot.forest.lookup_segments({{"world", "base"}}, when(step), {}, true);
+    REQUIRE(seen);
+    const ObservedEdge edge{belief_of(seen->values[0], seen->correlations[0]),
+                            ObservedEdge::Way::kDown};
+    const Transform Z{robot.G * shift(0.02 * step), of_deviations(1e-3, 1e-3)};
+    const auto found = observe({edge}, Z, "observed:" + std::to_string(step), {1.0, true});
+    REQUIRE(found);
+    const Belief& X = found->edges[0].X_PC;
+    REQUIRE(robot.forest.revise({{"base", {X.pose, X.own}, {false, X.common_errors, {}}}}, at(step),
+                                seen->commit));
+  }
+  for (const int step : {2, 4}) {
+    const auto there = robot.forest.lookup("world", "base", when(step));
+    REQUIRE(there);
+    for (const int ms : {1, 50, 99}) {
+      CAPTURE(step, ms);
+      const Query then = when(at(step) - std::chrono::milliseconds(ms));
+      const auto X = robot.forest.lookup("world", "base", then);
+      REQUIRE(X);
+      if (ms == 1) CHECK((X->pose.inverse() * there->pose).translation().norm() < 5e-3);
+      // The share of each sample's error, as if these were independent.
+      const double s = 1 - 0.01 * ms;
+      const double until = (1 - s) * robot.sigma("world", "base", step - 1);
+      const double since = s * robot.sigma("world", "base", step);
+      CHECK(std::sqrt(X->covariance.of_specified().upper()[0]) >= std::hypot(until, since));
+    }
+  }
+}
+
 TEST_CASE("drift: beyond the newest sample the error goes on from there") {
   Drifting robot;
   for (int step = 0; step < 3; ++step) {
