@@ -10,6 +10,7 @@
 
 #include "fuzz/demand.hpp"
 #include "transport/fastdds/number_bounds.hpp"
+#include "transport/fastdds/reassembly.hpp"
 #include "transport/fastdds/rtps_check.hpp"
 
 namespace tfdude::fuzz {
@@ -51,13 +52,14 @@ class Proxy {
   std::set<std::uint64_t> early_;
 };
 
-class Model final : public fastdds::NumberClaims {
+class Model final : public fastdds::NumberClaims, public fastdds::FragmentTaker {
  public:
   bool admit(const NumberClaim& claim) override {
     // What a participant can have walked through at once, of a writer that it meets late.
     constexpr std::uint64_t kMostSteps = 1U << 25U;
     demand(claim.kind == Kind::kAcknowledgement || claim.last + 1 >= claim.first, "a range");
     if (!bounds_.admit(claim, now_)) return false;
+    fragments = fragments || claim.kind == Kind::kFragments;
     if (claim.kind == Kind::kAcknowledgement) return true;
     const bool user = (claim.writer[3] & 0xC0U) == 0;
     if (user && claim.last > kMostSteps) return true;  // more than a model has time for
@@ -66,10 +68,26 @@ class Model final : public fastdds::NumberClaims {
     demand(proxy.early() <= 3 * fastdds::kLongestRange, "few numbers are kept");
     return true;
   }
-  void begin() { now_ += std::chrono::milliseconds(1); }
+  void begin() {
+    now_ += std::chrono::milliseconds(1);
+    fragments = false;
+  }
+  void take(const NumberClaim& claim, std::vector<std::uint8_t> datagram) override {
+    sent_ += datagram.size();
+    for (const auto& one : reassembly_.take(claim, std::move(datagram), now_)) {
+      sent_ -= one.size();
+    }
+    demand(reassembly_.bytes() <= sent_ + kRows, "little is kept");
+  }
+  bool fragments = false;  // in the datagram at hand
 
  private:
+  // A bit for each fragment of a sample.
+  static constexpr std::size_t kRows =
+      fastdds::Reassembly::kMost * (fastdds::kLargestSample / fastdds::kSmallestFragment / 8 + 256);
   NumberBounds bounds_;
+  fastdds::Reassembly reassembly_;
+  std::size_t sent_ = 0;
   NumberBounds::Clock::time_point now_{std::chrono::hours(1)};
   std::map<std::pair<NumberClaim::Prefix, NumberClaim::Entity>, Proxy> proxies_;
 };
@@ -84,6 +102,11 @@ void run(const std::uint8_t* data, std::size_t size) {
     model.begin();
     const auto flaw = fastdds::check_datagram(datagram.data(), datagram.size(), secured, model);
     demand(*fastdds::to_string(flaw) != '\0' || flaw == fastdds::DatagramFlaw::kNone, "a reason");
+    if (flaw == fastdds::DatagramFlaw::kNone && model.fragments) {
+      demand(fastdds::take_fragments(datagram.data(), datagram.size(), model).size() <=
+                 datagram.size(),
+             "what is left is a part");
+    }
     at += 2 + length;
   }
 }

@@ -1,6 +1,10 @@
 #include "transport/fastdds/datagram_guard.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include "base/log.hpp"
+#include "transport/fastdds/rtps_layout.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -10,11 +14,16 @@ using Clock = DatagramGuard::Clock;
 class Received final : public NumberClaims {
  public:
   Received(NumberBounds& bounds, Clock::time_point now) : bounds_(bounds), now_(now) {}
-  bool admit(const NumberClaim& claim) override { return bounds_.admit(claim, now_); }
+  bool admit(const NumberClaim& claim) override {
+    fragments_ = fragments_ || claim.kind == NumberClaim::Kind::kFragments;
+    return bounds_.admit(claim, now_);
+  }
+  [[nodiscard]] bool fragments() const { return fragments_; }
 
  private:
   NumberBounds& bounds_;
   const Clock::time_point now_;
+  bool fragments_ = false;
 };
 
 class Sent final : public NumberClaims {
@@ -32,9 +41,40 @@ class Sent final : public NumberClaims {
 }  // namespace
 
 DatagramFlaw DatagramGuard::check(const std::uint8_t* datagram, std::size_t size,
-                                  Clock::time_point now) {
+                                  Clock::time_point now, bool& fragments) {
   Received claims(bounds_, now);
-  return check_datagram(datagram, size, secured_, claims);
+  const DatagramFlaw flaw = check_datagram(datagram, size, secured_, claims);
+  fragments = claims.fragments();
+  if (!secured_ || (flaw != DatagramFlaw::kNone && flaw != DatagramFlaw::kFarewell)) return flaw;
+  PeerId sender{};
+  std::copy_n(datagram + rtps::kPrefixAt, sender.size(), sender.begin());
+  if (flaw == DatagramFlaw::kFarewell) {
+    departures_.said(sender, now);
+  } else {
+    departures_.heard(sender, now);
+  }
+  return flaw;
+}
+
+std::vector<std::vector<Reassembly::Datagram>> DatagramGuard::reassemble(
+    const std::uint8_t* datagram, std::size_t size, Clock::time_point now) {
+  class Taker final : public FragmentTaker {
+   public:
+    Taker(Reassembly& kept, Clock::time_point at) : kept_(kept), now_(at) {}
+    void take(const NumberClaim& claim, Reassembly::Datagram one) override {
+      auto whole = kept_.take(claim, std::move(one), now_);
+      if (!whole.empty()) all.push_back(std::move(whole));
+    }
+    std::vector<std::vector<Reassembly::Datagram>> all;
+
+   private:
+    Reassembly& kept_;
+    const Clock::time_point now_;
+  } taker(fragments_, now);
+  auto rest = take_fragments(datagram, size, taker);
+  // Behind, as a heartbeat among it asks for what was not received.
+  if (!rest.empty()) taker.all.push_back({std::move(rest)});
+  return std::move(taker.all);
 }
 
 void DatagramGuard::send(const std::uint8_t* datagram, std::size_t size) {

@@ -6,8 +6,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "transport/fastdds/departures.hpp"
 #include "transport/fastdds/number_bounds.hpp"
+#include "transport/fastdds/reassembly.hpp"
 #include "transport/fastdds/rtps_check.hpp"
 
 namespace tfdude::fastdds {
@@ -27,17 +30,42 @@ class DatagramGuard {
   /// All that the participant sends passes send(). Call it before the participant is created.
   void sees_all_sent() { sees_sent_ = !secured_; }
 
+  struct Bytes {
+    const std::uint8_t* data;
+    std::size_t size;
+  };
+
+  /// Calls deliver(datagrams, many) for what Fast DDS may have, all of it or nothing: this datagram,
+  /// or, if it has fragments, all of a sample whose last ones they are, and then what else is in it.
   /// @param from  names the sender, for the log
-  template <class Name>
-  [[nodiscard]] bool admit(const std::uint8_t* datagram, std::size_t size, Clock::time_point now,
-                           const Name& from) {
-    const DatagramFlaw flaw = check(datagram, size, now);
-    if (flaw == DatagramFlaw::kNone) return true;
-    if (count(flaw, now)) log(flaw, from());
-    return false;
+  template <class Name, class Deliver>
+  void receive(const std::uint8_t* datagram, std::size_t size, Clock::time_point now,
+               const Name& from, const Deliver& deliver) {
+    bool fragments = false;
+    const DatagramFlaw flaw = check(datagram, size, now, fragments);
+    if (flaw == DatagramFlaw::kFarewell) return;
+    if (flaw != DatagramFlaw::kNone) {
+      if (count(flaw, now)) log(flaw, from());
+    } else if (!fragments) {
+      const Bytes only{datagram, size};
+      deliver(&only, std::size_t{1});
+    } else {
+      for (const auto& whole : reassemble(datagram, size, now)) {
+        std::vector<Bytes> all;
+        for (const auto& one : whole) all.push_back({one.data(), one.size()});
+        deliver(all.data(), all.size());
+      }
+    }
   }
 
   void send(const std::uint8_t* datagram, std::size_t size);
+
+  /// Calls leave(peer) for each participant that has said, unprotected, that it leaves, and is
+  /// silent since. Without keys there is none: Fast DDS has such a datagram at once.
+  template <class Leave>
+  void take_departed(Clock::time_point now, const Leave& leave) {
+    departures_.take(now, leave);
+  }
 
   /// How many were dropped.
   [[nodiscard]] std::uint64_t refused() const;
@@ -49,13 +77,17 @@ class DatagramGuard {
   };
 
   [[nodiscard]] DatagramFlaw check(const std::uint8_t* datagram, std::size_t size,
-                                   Clock::time_point now);
+                                   Clock::time_point now, bool& fragments);
+  [[nodiscard]] std::vector<std::vector<Reassembly::Datagram>> reassemble(
+      const std::uint8_t* datagram, std::size_t size, Clock::time_point now);
   bool count(DatagramFlaw flaw, Clock::time_point now);  // returns whether to log it
   void log(DatagramFlaw flaw, const std::string& from) const;
 
   const bool secured_;
   bool sees_sent_ = false;
   NumberBounds bounds_;
+  Departures departures_;
+  Reassembly fragments_;
   std::array<Kind, static_cast<std::size_t>(DatagramFlaw::kFlawCount)> kinds_;
 };
 

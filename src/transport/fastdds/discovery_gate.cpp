@@ -141,7 +141,18 @@ class GatedTransport final : public SendFilter {
                const ertps::Locator_t& remote) override {
     const auto now = LifeSigns::Clock::now();
     const auto sender = [&remote] { return ertps::IPLocator::ip_to_string(remote); };
-    if (!descriptor_.guard->admit(bytes, size, now, sender)) return;
+    descriptor_.guard->receive(bytes, size, now, sender,
+                               [&](const DatagramGuard::Bytes* all, std::size_t many) {
+                                 admitted(next, all, many, local, remote, now);
+                               });
+    descriptor_.guard->take_departed(
+        now, [this](const PeerId& peer) { descriptor_.farewells->say_for(peer); });
+  }
+
+ private:
+  void admitted(etransport::TransportReceiverInterface* next, const DatagramGuard::Bytes* all,
+                std::size_t many, const ertps::Locator_t& local, const ertps::Locator_t& remote,
+                LifeSigns::Clock::time_point now) {
     // Before the gate: whoever holds both may shut it.
     std::unique_lock<std::mutex> one_by_one;
     if (descriptor_.discovering != nullptr && !descriptor_.data_ports.contain(local.port)) {
@@ -149,31 +160,33 @@ class GatedTransport final : public SendFilter {
     }
     const Gate::Pass pass(*descriptor_.gate, now);
     if (!pass) return;
-    descriptor_.life_signs->heard(bytes, size, now);
-    descriptor_.acknowledgements->heard(bytes, size);
+    for (std::size_t i = 0; i < many; ++i) {
+      descriptor_.life_signs->heard(all[i].data, all[i].size, now);
+      descriptor_.acknowledgements->heard(all[i].data, all[i].size);
+    }
     // The sender is not to blame if the gate was shut.
     const auto begin = FairShare::Clock::now();
     FairShare::begin(begin);
-    handle(next, bytes, size, local, remote, begin);
+    handle(next, all, many, local, remote, begin);
     FairShare::end(FairShare::Clock::now());
   }
 
- private:
   // Messages of discovery come to a thread of their own.
-  void handle(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
-              std::uint32_t size, const ertps::Locator_t& local, const ertps::Locator_t& remote,
+  void handle(etransport::TransportReceiverInterface* next, const DatagramGuard::Bytes* all,
+              std::size_t many, const ertps::Locator_t& local, const ertps::Locator_t& remote,
               FairShare::Clock::time_point now) {
+    const auto take = [&](const std::uint8_t* bytes, std::size_t size) {
+      SendFilter::receive(next, bytes, static_cast<std::uint32_t>(size), local, remote);
+    };
     if (!descriptor_.data_ports.contain(local.port)) {
-      SendFilter::receive(next, bytes, size, local, remote);
-      descriptor_.farewells->take([&](const Farewells::Datagram& farewell) {
-        const auto length = static_cast<std::uint32_t>(farewell.size());
-        SendFilter::receive(next, farewell.data(), length, local, remote);
-      });
+      for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
+      descriptor_.farewells->take(
+          [&](const Farewells::Datagram& farewell) { take(farewell.data(), farewell.size()); });
       return;
     }
     const FairShare::Sender sender = sender_at(remote);
     if (!descriptor_.shares->admits(sender, now)) return;
-    SendFilter::receive(next, bytes, size, local, remote);
+    for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
     const auto end = FairShare::Clock::now();
     descriptor_.shares->spent(sender, end - now, end);
   }

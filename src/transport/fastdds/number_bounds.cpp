@@ -100,17 +100,8 @@ bool NumberBounds::admit_kind(Entry& entry, const NumberClaim& claim) {
     case Kind::kGap:
       if (entry.existing == 0) entry.existing = claim.first;
       return claim.last < entry.existing + kLongestRange;
-    case Kind::kFragments: {
-      const bool same = entry.fragmented == claim.first;
-      if (same && (entry.sample_bytes != claim.sample_bytes ||
-                   entry.fragment_bytes != claim.fragment_bytes)) {
-        return false;
-      }
-      entry.fragmented = claim.first;
-      entry.sample_bytes = claim.sample_bytes;
-      entry.fragment_bytes = claim.fragment_bytes;
-      return true;
-    }
+    case Kind::kFragments:
+      return !is_of_discovery(claim.writer) || claim.sample_bytes <= kLargestOfDiscovery;
     default:
       return true;
   }

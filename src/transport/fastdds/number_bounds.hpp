@@ -22,7 +22,7 @@ namespace tfdude::fastdds {
 /// - A GAP reaches at most kLongestRange beyond the first sample that exists.
 /// - An acknowledgement is of something that was sent: at most kUnannounced numbers beyond the last
 ///   heartbeat.
-/// - Fragments of one sample say the same of its size.
+/// - Samples of discovery that come in fragments have at most kLargestOfDiscovery bytes.
 ///
 /// Numbers are remembered of kRoom writers; the one not heard for longest makes room.
 /// @par Thread safety  All functions are thread-safe; one call costs some 50 ns.
@@ -35,6 +35,7 @@ class NumberBounds {
   static constexpr std::uint64_t kFirst = std::uint64_t{1} << 32U;
   static constexpr std::uint64_t kUnannounced = 1024;
   static constexpr std::size_t kRoom = 4096;
+  static constexpr std::uint32_t kLargestOfDiscovery = 65'536;
 
   NumberBounds() : heard_(kRoom), sent_(kRoom) {}
 
@@ -57,10 +58,7 @@ class NumberBounds {
     std::uint64_t reached = 0;
     std::uint64_t existing = 0;  // the first sample that exists; 0: not known
     Clock::time_point heard{};
-    std::uint64_t fragmented = 0;  // the newest sample that came in fragments
-    std::uint32_t sample_bytes = 0;
     std::uint32_t count = 0;
-    std::uint16_t fragment_bytes = 0;
   };
   using Table = std::vector<Entry>;
 

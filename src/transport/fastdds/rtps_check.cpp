@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 #include <endian.h>
+#include <functional>
+#include <utility>
 
 #include "transport/fastdds/rtps_layout.hpp"
 
@@ -123,7 +125,8 @@ struct Submessage {
 
 class Check {
  public:
-  Check(bool secured, NumberClaims& claims) : secured_(secured), claims_(claims) {}
+  Check(bool secured, NumberClaims& claims)
+      : secured_(secured), claims_(claims), open_(!secured) {}
 
   Flaw run(const std::uint8_t* datagram, std::size_t size) {
     constexpr std::uint8_t kMajorVersion = 2;
@@ -146,6 +149,38 @@ class Check {
       at += std::min(length, size - at);
     }
     return Flaw::kNone;
+  }
+
+  // Of a datagram that was checked.
+  std::vector<std::uint8_t> divide(const std::uint8_t* datagram, std::size_t size,
+                                   const std::function<void(std::vector<std::uint8_t>)>& fragment) {
+    const auto append = [&](std::vector<std::uint8_t>& to, std::size_t at, std::size_t length) {
+      to.insert(to.end(), datagram + at, datagram + at + std::min(length, size - at));
+    };
+    std::copy_n(datagram + rtps::kPrefixAt, sender_.size(), sender_.begin());
+    std::vector<std::uint8_t> before(datagram, datagram + rtps::kHeader);
+    std::vector<std::uint8_t> rest = before;
+    bool only_fragments = true;
+    std::size_t length = 0;
+    for (std::size_t at = rtps::kHeader; at < size; at += length) {
+      Submessage next;
+      length = begin(datagram + at, size - at, next);
+      if (length == 0) break;
+      if (next.id == rtps::kDataFragment) {
+        std::vector<std::uint8_t> one = before;
+        append(one, at, length);
+        if (fragments(next) == Flaw::kNone) fragment(std::move(one));
+        continue;
+      }
+      append(rest, at, length);
+      if (is_of_following(next.id)) {
+        append(before, at, length);
+        if (next.id == rtps::kInfoSource) (void)source(next);
+      } else if (next.id != rtps::kPad) {
+        only_fragments = false;
+      }
+    }
+    return only_fragments ? std::vector<std::uint8_t>() : rest;
   }
 
   // Of a datagram that is made here.
@@ -173,6 +208,14 @@ class Check {
     if (length == 0 && !may_be_empty) length = left - kOwnHeader;
     submessage.body = Bytes(from + kOwnHeader, length, submessage.little());
     return kOwnHeader + (length + 3) / 4 * 4;
+  }
+
+  // RTPS 2.2, 8.3.7: where, from whom and when the next submessages are.
+  static bool is_of_following(std::uint8_t id) {
+    constexpr std::uint8_t kInfoReplyIp4 = 0x0D;
+    constexpr std::uint8_t kInfoReply = 0x0F;
+    return id == rtps::kInfoTimestamp || id == rtps::kInfoSource || id == rtps::kInfoDestination ||
+           id == kInfoReplyIp4 || id == kInfoReply;
   }
 
   Flaw check(Submessage& next) {
@@ -232,10 +275,12 @@ class Check {
   }
 
   Flaw admit(Kind kind, const NumberClaim::Entity& writer, std::uint64_t first, std::uint64_t last,
-             std::uint32_t count = 0, std::uint32_t sample = 0, std::uint16_t fragment = 0) {
+             std::uint32_t count = 0) {
+    return admit({kind, sender_, writer, first, last, count});
+  }
+  Flaw admit(const NumberClaim& claim) {
     // What is protected as a whole comes from a participant with keys, or is dropped by Fast DDS.
     if (secured_ && open_) return Flaw::kNone;
-    const NumberClaim claim{kind, sender_, writer, first, last, count, sample, fragment};
     return claims_.admit(claim) ? Flaw::kNone : Flaw::kJump;
   }
 
@@ -244,12 +289,15 @@ class Check {
     if (to_inline_qos < read) return Flaw::kLength;
     in.skip(to_inline_qos - read);
     constexpr std::uint32_t kSentinel = 1;
+    constexpr std::uint32_t kStatusInfo = 0x71;
     while (has_qos && in.good()) {
       const std::uint32_t id = in.u16();
       const std::uint32_t size = in.u16();
       if (id == kSentinel) break;
       if (size % 4 != 0) return Flaw::kLength;
-      in.skip(size);
+      const std::uint8_t* const value = in.skip(size);
+      // RTPS 2.2, 9.6.3.9: disposed, unregistered. The last byte has these flags.
+      if (id == kStatusInfo && size == 4 && value != nullptr) disposes_ = (value[3] & 3U) != 0;
     }
     return in.good() ? Flaw::kNone : Flaw::kLength;
   }
@@ -264,6 +312,7 @@ class Check {
     if (!in.good()) return Flaw::kLength;
     if (!may_talk(next, writer)) return Flaw::kUnprotected;
     if (number == 0 || number > kMaxNumber) return Flaw::kNumber;
+    disposes_ = false;
     if (const Flaw flaw = skip_inline_qos(in, to_inline_qos, 16, next.has(kInlineQos));
         flaw != Flaw::kNone) {
       return flaw;
@@ -271,8 +320,11 @@ class Check {
     if (next.has(rtps::kDataFlag) && next.has(kKeyFlag)) return Flaw::kNumber;
     const bool has_payload = next.has(rtps::kDataFlag) || next.has(kKeyFlag);
     if (has_payload && in.left() < 4) return Flaw::kLength;
-    if (next.has(rtps::kDataFlag) && writer == kAnnouncer && !announcement(in))
-      return Flaw::kLength;
+    if (next.has(rtps::kDataFlag) && writer == kAnnouncer) {
+      if (const Flaw flaw = announcement(in); flaw != Flaw::kNone) return flaw;
+    }
+    const bool leaves = disposes_ || next.has(kKeyFlag);
+    if (!open_ && !next.shielded && writer == kAnnouncer && leaves) return Flaw::kFarewell;
     if (next.has(rtps::kDataFlag) && writer == kHandshaker && !handshake(in)) return Flaw::kLength;
     return admit(Kind::kData, writer, number, number);
   }
@@ -284,8 +336,9 @@ class Check {
     return {in.at(), in.left(), little};
   }
 
-  static bool announcement(const Bytes& payload) {
+  [[nodiscard]] Flaw announcement(const Bytes& payload) const {
     constexpr std::uint32_t kSentinel = 1;
+    constexpr std::uint32_t kLease = 2;
     constexpr std::array<std::uint32_t, 3> kTokens{0x1001, 0x1002, 0x1006};
     Bytes in = without_encapsulation(payload);
     while (in.good()) {
@@ -293,13 +346,17 @@ class Check {
       const std::size_t size = in.u16();
       if (id == kSentinel) break;
       const std::uint8_t* const value = in.skip(size);
-      if (value == nullptr) return false;
+      if (value == nullptr) return Flaw::kLength;
+      if (id == kLease && !open_) {
+        const auto seconds = static_cast<std::int32_t>(payload_part(payload, value, size).u32());
+        if (seconds < kShortestLease) return Flaw::kNumber;
+      }
       if (std::find(kTokens.begin(), kTokens.end(), id) == kTokens.end()) continue;
       Bytes token = payload_part(payload, value, size);
       data_holder(token);
-      if (!token.good()) return false;
+      if (!token.good()) return Flaw::kLength;
     }
-    return in.good();
+    return in.good() ? Flaw::kNone : Flaw::kLength;
   }
 
   static Bytes payload_part(const Bytes& payload, const std::uint8_t* value, std::size_t size) {
@@ -329,6 +386,8 @@ class Check {
     const std::uint32_t sample = in.u32();
     if (!in.good()) return Flaw::kLength;
     if (!may_talk(next, writer)) return Flaw::kUnprotected;
+    // One datagram has room for all announcements.
+    if (writer == kAnnouncer) return Flaw::kLength;
     if (number == 0 || number > kMaxNumber || first == 0 || many == 0) return Flaw::kNumber;
     if (bytes < kSmallestFragment || sample == 0 || sample > kLargestSample) return Flaw::kNumber;
     const std::uint64_t from = (first - 1) * bytes;
@@ -339,7 +398,8 @@ class Check {
       return flaw;
     }
     if (!next.has(kKeyFlagOfFragments) && in.left() < to - from) return Flaw::kLength;
-    return admit(Kind::kFragments, writer, number, number, 0, sample, bytes);
+    return admit({Kind::kFragments, sender_, writer, number, number, 0, sample, bytes,
+                  static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(many)});
   }
 
   Flaw heartbeat(Submessage& next) {
@@ -412,7 +472,8 @@ class Check {
   const bool secured_;
   NumberClaims& claims_;
   NumberClaim::Prefix sender_{};
-  bool open_ = false;  // everything may be said
+  bool open_;              // everything may be said
+  bool disposes_ = false;  // the DATA at hand, by its inline QoS
 };
 
 }  // namespace
@@ -429,9 +490,26 @@ const char* to_string(DatagramFlaw flaw) {
       return "not protected by keys";
     case Flaw::kJump:
       return "a sequence number far beyond those of its writer";
+    case Flaw::kFarewell:
+      return "a participant is said to leave";
     default:
       return "";
   }
+}
+
+std::vector<std::uint8_t> take_fragments(const std::uint8_t* datagram, std::size_t size,
+                                         FragmentTaker& taker) {
+  class Claimed final : public NumberClaims {
+   public:
+    bool admit(const NumberClaim& one) override {
+      claim = one;
+      return true;
+    }
+    NumberClaim claim{};
+  } claimed;
+  return Check(false, claimed).divide(datagram, size, [&](std::vector<std::uint8_t> one) {
+    taker.take(claimed.claim, std::move(one));
+  });
 }
 
 void for_each_heartbeat(const std::uint8_t* datagram, std::size_t size, NumberClaims& claims) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 // What a datagram must be before Fast DDS may have it. Fast DDS (2.9 and 3.1) believes numbers and
 // lengths that a stranger may choose: it walks through all numbers of a GAP, and of those that a
@@ -19,6 +20,7 @@ enum class DatagramFlaw : std::uint8_t {
   kNumber,       ///< a number that RTPS does not allow, or a range that is too long
   kUnprotected,  ///< only participants with keys may say this, and it is not protected
   kJump,         ///< a sequence number further ahead than its writer can be
+  kFarewell,     ///< it says of a participant with keys that this leaves, which may be a lie
   kFlawCount
 };
 
@@ -41,6 +43,8 @@ struct NumberClaim {
   std::uint32_t count = 0;         ///< of the heartbeat
   std::uint32_t sample_bytes = 0;  ///< of the sample whose fragments these are
   std::uint16_t fragment_bytes = 0;
+  std::uint32_t fragment = 0;  ///< the first of them, from 1
+  std::uint32_t many = 0;
 };
 
 class NumberClaims {
@@ -59,6 +63,8 @@ inline constexpr std::uint64_t kLongestRange = 65'536;
 inline constexpr std::uint32_t kLargestSample = 16U << 20U;
 /// Fast DDS writes a number at the begin of each fragment. Those of any DDS are larger.
 inline constexpr std::uint16_t kSmallestFragment = 64;
+/// [s] With keys, an announcement may not say that its participant is lost earlier.
+inline constexpr std::int32_t kShortestLease = 5;
 
 /// Checks a datagram as far as it can be read: its header, the length and the numbers of each
 /// submessage, and what discovery and handshake contain. Encrypted parts cannot be read.
@@ -68,6 +74,21 @@ inline constexpr std::uint16_t kSmallestFragment = 64;
 /// @par Complexity  O(size); does not allocate
 [[nodiscard]] DatagramFlaw check_datagram(const std::uint8_t* datagram, std::size_t size,
                                           bool secured, NumberClaims& claims);
+
+/// Takes fragments out of a datagram.
+class FragmentTaker {
+ public:
+  /// @param datagram  in which these fragments are all that is of a writer
+  virtual void take(const NumberClaim& claim, std::vector<std::uint8_t> datagram) = 0;
+
+ protected:
+  ~FragmentTaker() = default;
+};
+
+/// Divides a datagram that was checked, and that has fragments: each DATA_FRAG into one of its own.
+/// @return the rest; empty: there is nothing else
+[[nodiscard]] std::vector<std::uint8_t> take_fragments(const std::uint8_t* datagram,
+                                                       std::size_t size, FragmentTaker& taker);
 
 /// Passes on what the heartbeats of an own datagram claim. Its sender counts for nothing.
 void for_each_heartbeat(const std::uint8_t* datagram, std::size_t size, NumberClaims& claims);

@@ -111,18 +111,15 @@ TEST_CASE("number bounds: only what was sent is acknowledged") {
   CHECK_FALSE(acknowledged(1ULL << 40U, testing::kPublicationsWriter));
 }
 
-TEST_CASE("number bounds: fragments of one sample agree on its size") {
+TEST_CASE("number bounds: what discovery sends in fragments is small") {
   Heard heard;
-  const auto fragments = [&](std::uint64_t number, std::uint32_t sample, std::uint16_t bytes) {
-    return heard.bounds.admit(
-        {Kind::kFragments, kSender, testing::kUserWriter, number, number, 0, sample, bytes},
-        heard.now);
+  const auto fragments = [&](const NumberClaim::Entity& writer, std::uint32_t sample) {
+    return heard.bounds.admit({Kind::kFragments, kSender, writer, 3, 3, 0, sample, 1000},
+                              heard.now);
   };
-  CHECK(fragments(3, 1'000'000, 1000));
-  CHECK(fragments(3, 1'000'000, 1000));
-  CHECK_FALSE(fragments(3, 999'001, 1000));
-  CHECK_FALSE(fragments(3, 1'000'000, 500));
-  CHECK(fragments(4, 999'001, 1000));
+  CHECK(fragments(testing::kUserWriter, kLargestSample));
+  CHECK(fragments(testing::kPublicationsWriter, NumberBounds::kLargestOfDiscovery));
+  CHECK_FALSE(fragments(testing::kPublicationsWriter, NumberBounds::kLargestOfDiscovery + 1));
 }
 
 TEST_CASE("number bounds: whoever fills the table is only himself forgotten or newly met") {
