@@ -50,7 +50,8 @@ Directory::Known& Directory::known(const std::string& partition, Owner& owner) {
 bool Directory::has_room_for(const Known& partition, const Page& page) const {
   std::size_t items = items_of_all(page);
   for (const Known& one : partitions_) {
-    items += one.items + one.awaited.size() + (one.successor ? one.successor->items : 0);
+    items += one.items + one.awaited.size();
+    for (const auto* aside : {&one.successor, &one.silenced}) items += *aside ? (*aside)->items : 0;
   }
   if (items <= most_items_) return true;
   // The page may replace one.
@@ -96,6 +97,10 @@ Directory::Successor* Directory::succeed(Known& partition, std::uint64_t incarna
   // not, and would leave the structure incomplete for ever.
   if (partition.successor && partition.successor->incarnation != partition.live) {
     partition.successor.reset();
+  }
+  if (partition.silenced && partition.silenced->incarnation <= partition.live) {
+    auto silenced = std::exchange(partition.silenced, {});
+    if (silenced->incarnation == partition.live) partition.successor = std::move(silenced);
   }
   if (incarnation == partition.incarnation) return nullptr;
   if (partition.pages.empty() && !partition.successor) {
@@ -209,6 +214,8 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
     for (Tombstone& tombstone : new_tombstones(partition, page.tombstones))
       fresh.push_back(std::move(tombstone));
   }
+  std::optional<Successor> later;
+  if (successor.incarnation < partition.incarnation) later = structure_in_force(partition, owner);
   partition.incarnation = successor.incarnation;
   partition.page_count = *successor.page_count;
   partition.epoch = partition.awaited_epoch = 0;
@@ -233,6 +240,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
                    now != partition.pages.end() ? now->second.tombstones : std::vector<Tombstone>(),
                    owner, number);
   }
+  if (later) keep_for_return(partition, std::move(*later));
   claims_.mend();
   report(fresh, owner);
   for (const auto& [number, page] : pages) find_orphans(page.tombstones, owner);
@@ -296,15 +304,11 @@ void Directory::unclaim_all_but(const Ids& stays, Known& partition, Owner owner,
   });
 }
 
-// What has come of the latest process, as it was published.
-Directory::Successor Directory::structure_of(const Known& partition, Owner owner) {
-  if (partition.successor && partition.successor->incarnation == partition.live) {
-    return *partition.successor;
-  }
-  Successor structure{partition.live, {}, {}, 0};
-  if (partition.incarnation != partition.live) return structure;
+// As it was published.
+Directory::Successor Directory::structure_in_force(const Known& partition, Owner owner) {
+  Successor structure{partition.incarnation, {}, {}, 0};
   for (const auto& [number, kept] : partition.pages) {
-    Page page{partition.info.name, number, partition.live, kept.epoch, {}, kept.tombstones};
+    Page page{partition.info.name, number, structure.incarnation, kept.epoch, {}, kept.tombstones};
     for_each_id(kept.ids, [&, number = number](std::string_view id) {
       const auto claim = claims_.claim_of(std::string(id), owner);
       if (!claim || claim->page != number) return;
@@ -345,14 +349,6 @@ Owner Directory::refer_to(const std::string& partition) {
   Owner owner = kHeldHere;
   (void)known(partition, owner);
   return owner;
-}
-
-std::vector<Owner> Directory::reachable_owners() const {
-  std::vector<Owner> all;
-  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
-    if (reachable(owner)) all.push_back(owner);
-  }
-  return all;
 }
 
 const std::string* Directory::incomplete() const {

@@ -230,8 +230,7 @@ class Directory {
     std::size_t items = 0;
   };
 
-  /// A new incarnation of a partition with a known structure, until all its pages have come. Or one
-  /// that a participant without a voice has taken for forgotten, until it returns.
+  /// A new incarnation of a partition with a known structure, until all its pages have come.
   struct Successor {
     std::uint64_t incarnation = 0;
     std::optional<std::uint32_t> page_count;  // from its presence
@@ -251,6 +250,9 @@ class Directory {
     std::map<std::uint32_t, KeptPage> pages;
     std::size_t items = 0;  // of the pages
     std::optional<Successor> successor;
+    // What has come of a process that is taken for gone, and may only be silent. Its pages do not
+    // come again, since nobody tells it that they were dropped.
+    std::optional<Successor> silenced;
     std::uint64_t cut = 0;  // the latest incarnation of which pages were dropped
     // Of these the last versions were dropped; if there are kMostLeftOut, perhaps those of others.
     std::vector<std::uint32_t> left_out;
@@ -302,7 +304,10 @@ class Directory {
   void mark_absent(Known& partition, Owner owner, bool stopped, Time now,
                    std::chrono::nanoseconds early = {});
   void drop_structure(Known& partition, Owner owner);
-  [[nodiscard]] Successor structure_of(const Known& partition, Owner owner);
+  [[nodiscard]] Successor structure_in_force(const Known& partition, Owner owner);
+  [[nodiscard]] std::optional<Successor> structure_of_live(const Known& partition, Owner owner);
+  /// Of several, the latest. What is kept was there before, so this takes no more room.
+  void keep_for_return(Known& partition, Successor structure);
   void tell_claims();
   static Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);

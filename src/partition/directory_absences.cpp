@@ -45,12 +45,14 @@ bool Directory::drop_outdated(Known& partition, std::uint64_t incarnation) {
   // number.
   const bool is_told = told_absence(partition).has_value();
   if (!is_told && !partition.info.reachable) {
-    const bool kept = partition.successor && partition.successor->incarnation == incarnation;
+    const bool kept = partition.silenced && partition.silenced->incarnation == incarnation;
     // Others may not say again that they have forgotten it. What was kept they have not forgotten.
     if (partition.forgotten && !kept)
       partition.to_forget = std::max(partition.to_forget, partition.heard_of);
+    // This message may be late, and the later process be silent for a moment only.
+    if (partition.successor && partition.successor->incarnation > incarnation)
+      keep_for_return(partition, *std::exchange(partition.successor, {}));
     partition.live = partition.heard_of = 0;
-    if (!kept) partition.successor.reset();
     return false;
   }
   if (is_told) absences_.relied_on(partition.info.name);
@@ -226,11 +228,25 @@ void Directory::forget_if_gone(Known& partition, Time since) {
   if (!partition.to_forget_all || partition.info.reachable) return;
   const auto absence = absences_.find(partition.info.name);
   if (absence && absence->kind == Absent::Kind::kSilent) return;
-  const Owner owner = refer_to(partition.info.name);
-  std::optional<Successor> kept;
-  if (!has_voice()) kept = structure_of(partition, owner);
+  std::optional<Successor> latest;
+  if (!has_voice()) latest = structure_of_live(partition, refer_to(partition.info.name));
   (void)forget(partition.info.name, std::max(partition.live, partition.heard_of), since);
-  partition.successor = std::move(kept);
+  if (latest) keep_for_return(partition, std::move(*latest));
+}
+
+std::optional<Directory::Successor> Directory::structure_of_live(const Known& partition,
+                                                                 Owner owner) {
+  for (const auto* aside : {&partition.successor, &partition.silenced}) {
+    if (*aside && (*aside)->incarnation == partition.live) return *aside;
+  }
+  if (partition.incarnation != partition.live) return std::nullopt;
+  return structure_in_force(partition, owner);
+}
+
+void Directory::keep_for_return(Known& partition, Successor structure) {
+  auto& silenced = partition.silenced;
+  const bool is_latest = !silenced || silenced->incarnation <= structure.incarnation;
+  if (is_latest) silenced = std::move(structure);
 }
 
 void Directory::restore(const std::vector<Absent>& absent) {
@@ -275,6 +291,7 @@ Result<void> Directory::forget(const std::string& partition, std::uint64_t incar
   gone.forgotten = true;
   gone.to_forget_all = false;
   drop_structure(gone, number);
+  if (gone.silenced && gone.silenced->incarnation <= gone.heard_of) gone.silenced.reset();
   absences_.forget(partition, gone.heard_of, now);
   claims_.set_standing(number, Standing::kGone);
   tell_claims();
@@ -323,6 +340,14 @@ bool Directory::resolve_returns() {
   }
   if (resolved) tell_claims();
   return resolved;
+}
+
+std::vector<Owner> Directory::reachable_owners() const {
+  std::vector<Owner> all;
+  for (Owner owner = 1; owner < partitions_.size(); ++owner) {
+    if (reachable(owner)) all.push_back(owner);
+  }
+  return all;
 }
 
 std::optional<PartitionInfo> Directory::only_heard_of() const {

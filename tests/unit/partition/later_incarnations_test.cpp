@@ -55,6 +55,96 @@ TEST_CASE("messages of an outdated incarnation are reported once") {
   CHECK(base.owner_of("hand") == "arm");
 }
 
+// A process sends each page once, and only participants with a partition tell it that they have
+// dropped some.
+TEST_CASE("a client that hears an earlier process again loses nothing of a later one") {
+  Replica client("");
+  Directory& directory = client.directory;
+  const auto hear = [&](std::uint64_t incarnation, std::uint32_t pages = 2) {
+    directory.apply(presence_of("arm", incarnation, pages), kNow);
+  };
+  hear(5, 1);
+  directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
+  const Page first{"arm", 0, 9, 11, {{"hand", "", 10}, {"elbow", "", 11}}, {}, {{1, 11}}};
+  const Page last{"arm", 1, 9, 11, {{"finger", "hand", 12}}};
+  const Lines before{"hand <  @ arm"};
+  const Lines after{"elbow <  @ arm", "finger < hand @ arm, attached", "hand <  @ arm"};
+  directory.apply(first);
+  SECTION("of which only pages have come") {
+    REQUIRE(directory.lost("arm", 9, kNow));
+    const bool all_there = GENERATE(false, true);
+    if (all_there) directory.apply(Page{"arm", 1, 9, 10, {}});
+    hear(5, 1);
+    CHECK(directory.serving("arm")->incarnation == 5);
+    CHECK(client.structure() == before);
+    CHECK(directory.complete());
+    SECTION("and it says first that it is there") {
+      hear(9);
+      CHECK(directory.complete() == all_there);
+      directory.apply(last);
+    }
+    SECTION("and it says later that it is there") {
+      directory.apply(last);
+      hear(9);
+    }
+    SECTION("and the earlier one is forgotten") {
+      REQUIRE(directory.lost("arm", 5, kNow));
+      REQUIRE(directory.forget("arm", 5, kNow));
+      CHECK(client.structure().empty());
+      hear(9);
+      directory.apply(last);
+    }
+  }
+  SECTION("whose structure was in force") {
+    directory.apply(last);
+    hear(9);
+    REQUIRE(client.structure() == after);
+    REQUIRE(directory.lost("arm", 9, kNow));
+    hear(5, 1);
+    CHECK(client.structure() == after);
+    directory.apply(page_of("arm", {{"hand", "", 10}}, 5));
+    CHECK(client.structure() == before);
+    CHECK(directory.complete());
+    hear(9);
+  }
+  CHECK(client.structure() == after);
+  CHECK(directory.complete());
+  CHECK(directory.epoch(*directory.owner("arm")) == 11);
+}
+
+TEST_CASE("what a client keeps of a silent process takes room until that returns or is gone") {
+  Replica client("");
+  Directory& directory = client.directory;
+  const auto hear = [&](std::uint64_t incarnation, const std::string& id) {
+    directory.apply(presence_of("arm", incarnation, 1), kNow);
+    directory.apply(page_of("arm", {{id, "", 10}}, incarnation));
+  };
+  directory.limit_others(4);
+  hear(9, "hand");
+  REQUIRE(directory.lost("arm", 9, kNow));
+  hear(5, "fist");
+  directory.apply(Page{"arm", 1, 5, 7, {{"lamp", "", 11}}});
+  REQUIRE(client.structure() == Lines{"fist <  @ arm"});
+  REQUIRE(directory.lost("arm", 5, kNow));
+  SECTION("it returns") {
+    directory.apply(presence_of("arm", 9, 1), kNow);
+    directory.apply(Page{"arm", 1, 9, 11, {{"lamp", "", 11}}});
+  }
+  SECTION("it is forgotten, too") {
+    REQUIRE(directory.forget("arm", 9, kNow));
+    directory.apply(presence_of("arm", 9, 1), kNow);
+    CHECK(client.structure().empty());
+    CHECK_FALSE(directory.complete());
+    hear(12, "hand");
+    directory.apply(Page{"arm", 1, 12, 14, {{"lamp", "", 11}}});
+  }
+  SECTION("a later one is there") {
+    hear(12, "hand");
+    directory.apply(Page{"arm", 1, 12, 14, {{"lamp", "", 11}}});
+  }
+  CHECK(client.structure() == Lines{"hand <  @ arm", "lamp <  @ arm"});
+}
+
 TEST_CASE("an incarnation known only from a lost participant hides no process that comes later") {
   Replica head("head");
   Presence base = presence_of("base", 1, 0);
