@@ -68,6 +68,7 @@ class Model final : public fastdds::NumberClaims, public fastdds::FragmentTaker 
     demand(proxy.early() <= 3 * fastdds::kLongestRange, "few numbers are kept");
     return true;
   }
+  bool admit_participant(const NumberClaim::Prefix&) override { return true; }
   void begin() {
     now_ += std::chrono::milliseconds(1);
     fragments = false;

@@ -13,7 +13,11 @@ using Clock = DatagramGuard::Clock;
 
 class Received final : public NumberClaims {
  public:
-  Received(NumberBounds& bounds, Clock::time_point now) : bounds_(bounds), now_(now) {}
+  Received(NumberBounds& bounds, Crowd& crowd, Clock::time_point now)
+      : bounds_(bounds), crowd_(crowd), now_(now) {}
+  bool admit_participant(const NumberClaim::Prefix& participant) override {
+    return crowd_.admit(participant, now_);
+  }
   bool admit(const NumberClaim& claim) override {
     fragments_ = fragments_ || claim.kind == NumberClaim::Kind::kFragments;
     return bounds_.admit(claim, now_);
@@ -22,6 +26,7 @@ class Received final : public NumberClaims {
 
  private:
   NumberBounds& bounds_;
+  Crowd& crowd_;
   const Clock::time_point now_;
   bool fragments_ = false;
 };
@@ -34,6 +39,8 @@ class Sent final : public NumberClaims {
     return true;
   }
 
+  bool admit_participant(const NumberClaim::Prefix&) override { return true; }
+
  private:
   NumberBounds& bounds_;
 };
@@ -42,7 +49,7 @@ class Sent final : public NumberClaims {
 
 DatagramFlaw DatagramGuard::check(const std::uint8_t* datagram, std::size_t size,
                                   Clock::time_point now, bool& fragments) {
-  Received claims(bounds_, now);
+  Received claims(bounds_, crowd_, now);
   const DatagramFlaw flaw = check_datagram(datagram, size, secured_, claims);
   fragments = claims.fragments();
   if (!secured_ || (flaw != DatagramFlaw::kNone && flaw != DatagramFlaw::kFarewell)) return flaw;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "transport/fastdds/crowd.hpp"
 #include "transport/fastdds/departures.hpp"
 #include "transport/fastdds/number_bounds.hpp"
 #include "transport/fastdds/reassembly.hpp"
@@ -35,8 +36,9 @@ class DatagramGuard {
     std::size_t size;
   };
 
-  /// Calls deliver(datagrams, many) for what Fast DDS may have, all of it or nothing: this datagram,
-  /// or, if it has fragments, all of a sample whose last ones they are, and then what else is in it.
+  /// Calls deliver(datagrams, many) for what Fast DDS may have, all of it or nothing: this
+  /// datagram, or, if it has fragments, all of a sample that they complete, and then what else is
+  /// in it.
   /// @param from  names the sender, for the log
   template <class Name, class Deliver>
   void receive(const std::uint8_t* datagram, std::size_t size, Clock::time_point now,
@@ -60,10 +62,12 @@ class DatagramGuard {
 
   void send(const std::uint8_t* datagram, std::size_t size);
 
-  /// Calls leave(peer) for each participant that has said, unprotected, that it leaves, and is
-  /// silent since. Without keys there is none: Fast DDS has such a datagram at once.
+  /// Calls leave(peer) for each participant that Fast DDS shall take for gone: those that have made
+  /// room for others, and those that have said, unprotected, that they leave, and are silent since.
+  /// Of the latter there are none without keys: Fast DDS has such a datagram at once.
   template <class Leave>
   void take_departed(Clock::time_point now, const Leave& leave) {
+    crowd_.take(leave);
     departures_.take(now, leave);
   }
 
@@ -86,6 +90,7 @@ class DatagramGuard {
   const bool secured_;
   bool sees_sent_ = false;
   NumberBounds bounds_;
+  Crowd crowd_;
   Departures departures_;
   Reassembly fragments_;
   std::array<Kind, static_cast<std::size_t>(DatagramFlaw::kFlawCount)> kinds_;

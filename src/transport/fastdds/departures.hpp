@@ -10,9 +10,9 @@
 
 namespace tfdude::fastdds {
 
-/// Participants of which a datagram said that they leave, without a proof: with keys, too, everybody
-/// may say so (DDS Security 1.1, 8.4.2.4). It is believed of who is then silent for kSilence; each
-/// participant announces itself every 300 ms.
+/// Participants of which a datagram said that they leave, without a proof: with keys, too, anybody
+/// may say so (DDS Security 1.1, 8.4.2.4). It is believed of those who are then silent for kSilence;
+/// each participant announces itself every 300 ms.
 /// @par Thread safety  All functions are thread-safe.
 class Departures {
  public:

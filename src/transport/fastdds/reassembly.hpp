@@ -13,14 +13,14 @@
 namespace tfdude::fastdds {
 
 /// Keeps fragments of samples until all of a sample have come, so that Fast DDS never has one in
-/// part. It (2.9 and 3.1) allocates the whole sample at its first fragment, and keeps it for as long
-/// as the writer lives; and if the same number then comes as DATA, it ends the process
+/// part. It (2.9 and 3.1) allocates the whole sample at its first fragment, and keeps it as long as
+/// the writer lives; and if the same number then comes as DATA, it ends the process
 /// (DataReaderHistory::update_instance_nts). Both cost a stranger one datagram.
 ///
 /// - What is kept are the bytes that came: at most kMostBytes, of kMost samples, and kOfWriter of
 ///   one writer. The one that has not grown for longest makes room.
-/// - Fragments that say other sizes are of another sample, even if that has the same number. The one
-///   that is first complete counts.
+/// - Fragments that say other sizes are of another sample, even if that has the same number. The
+///   one that is first complete counts.
 /// - A sample that does not grow for kPatience is dropped. A reliable writer then sends it again.
 /// @par Thread safety  All functions are thread-safe.
 class Reassembly {

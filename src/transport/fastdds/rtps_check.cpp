@@ -125,8 +125,7 @@ struct Submessage {
 
 class Check {
  public:
-  Check(bool secured, NumberClaims& claims)
-      : secured_(secured), claims_(claims), open_(!secured) {}
+  Check(bool secured, NumberClaims& claims) : secured_(secured), claims_(claims), open_(!secured) {}
 
   Flaw run(const std::uint8_t* datagram, std::size_t size) {
     constexpr std::uint8_t kMajorVersion = 2;
@@ -323,6 +322,10 @@ class Check {
     if (next.has(rtps::kDataFlag) && writer == kAnnouncer) {
       if (const Flaw flaw = announcement(in); flaw != Flaw::kNone) return flaw;
     }
+    if (next.has(rtps::kDataFlag) && writer == kAnnouncer && !disposes_ &&
+        !claims_.admit_participant(announced_)) {
+      return Flaw::kCrowd;
+    }
     const bool leaves = disposes_ || next.has(kKeyFlag);
     if (!open_ && !next.shielded && writer == kAnnouncer && leaves) return Flaw::kFarewell;
     if (next.has(rtps::kDataFlag) && writer == kHandshaker && !handshake(in)) return Flaw::kLength;
@@ -336,9 +339,11 @@ class Check {
     return {in.at(), in.left(), little};
   }
 
-  [[nodiscard]] Flaw announcement(const Bytes& payload) const {
+  [[nodiscard]] Flaw announcement(const Bytes& payload) {
+    announced_ = sender_;
     constexpr std::uint32_t kSentinel = 1;
     constexpr std::uint32_t kLease = 2;
+    constexpr std::uint32_t kGuid = 0x50;
     constexpr std::array<std::uint32_t, 3> kTokens{0x1001, 0x1002, 0x1006};
     Bytes in = without_encapsulation(payload);
     while (in.good()) {
@@ -347,6 +352,9 @@ class Check {
       if (id == kSentinel) break;
       const std::uint8_t* const value = in.skip(size);
       if (value == nullptr) return Flaw::kLength;
+      if (id == kGuid && size >= announced_.size()) {
+        std::copy_n(value, announced_.size(), announced_.begin());
+      }
       if (id == kLease && !open_) {
         const auto seconds = static_cast<std::int32_t>(payload_part(payload, value, size).u32());
         if (seconds < kShortestLease) return Flaw::kNumber;
@@ -472,8 +480,9 @@ class Check {
   const bool secured_;
   NumberClaims& claims_;
   NumberClaim::Prefix sender_{};
-  bool open_;              // everything may be said
-  bool disposes_ = false;  // the DATA at hand, by its inline QoS
+  bool open_;                        // everything may be said
+  bool disposes_ = false;            // the DATA at hand, by its inline QoS
+  NumberClaim::Prefix announced_{};  // the participant of the announcement at hand
 };
 
 }  // namespace
@@ -490,6 +499,8 @@ const char* to_string(DatagramFlaw flaw) {
       return "not protected by keys";
     case Flaw::kJump:
       return "a sequence number far beyond those of its writer";
+    case Flaw::kCrowd:
+      return "more participants than there is room for";
     case Flaw::kFarewell:
       return "a participant is said to leave";
     default:
@@ -505,6 +516,7 @@ std::vector<std::uint8_t> take_fragments(const std::uint8_t* datagram, std::size
       claim = one;
       return true;
     }
+    bool admit_participant(const NumberClaim::Prefix&) override { return true; }
     NumberClaim claim{};
   } claimed;
   return Check(false, claimed).divide(datagram, size, [&](std::vector<std::uint8_t> one) {

@@ -20,6 +20,7 @@ enum class DatagramFlaw : std::uint8_t {
   kNumber,       ///< a number that RTPS does not allow, or a range that is too long
   kUnprotected,  ///< only participants with keys may say this, and it is not protected
   kJump,         ///< a sequence number further ahead than its writer can be
+  kCrowd,        ///< it announces one participant more than there is room for
   kFarewell,     ///< it says of a participant with keys that this leaves, which may be a lie
   kFlawCount
 };
@@ -51,6 +52,8 @@ class NumberClaims {
  public:
   /// Whether the claim may be true.
   [[nodiscard]] virtual bool admit(const NumberClaim& claim) = 0;
+  /// Whether there is room for a participant, by the prefix of its GUIDs.
+  [[nodiscard]] virtual bool admit_participant(const NumberClaim::Prefix& participant) = 0;
 
  protected:
   ~NumberClaims() = default;

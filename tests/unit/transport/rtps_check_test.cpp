@@ -36,7 +36,12 @@ class Claims final : public NumberClaims {
     all.push_back(claim);
     return true;
   }
+  bool admit_participant(const NumberClaim::Prefix& participant) override {
+    participants.push_back(participant);
+    return participants.size() < 3;
+  }
   std::vector<NumberClaim> all;
+  std::vector<NumberClaim::Prefix> participants;
 };
 
 Flaw flaw_of(const Bytes& bytes, bool secured = false) {
@@ -311,6 +316,21 @@ TEST_CASE(
   const Datagram parts =
       from_sender().fragment(kParticipantReader, kParticipantWriter, 1, 1, 1, 100, 200, 100);
   CHECK(flaw_of(parts) == Flaw::kLength);
+}
+
+TEST_CASE("datagrams: there is room for a participant, whoever announces it") {
+  Bytes guid{9, 9, 9};
+  guid.resize(16);
+  const Bytes list = announcement(0x0050, guid);
+  for (const bool secured : {false, true}) {
+    Claims claims;
+    const Bytes bytes =
+        Datagram(kSender).data(kParticipantReader, kParticipantWriter, 1, list).bytes();
+    for (const Flaw flaw : {Flaw::kNone, Flaw::kNone, Flaw::kCrowd}) {
+      CHECK(check_datagram(bytes.data(), bytes.size(), secured, claims) == flaw);
+    }
+    CHECK(claims.participants[0] == NumberClaim::Prefix{9, 9, 9});
+  }
 }
 
 TEST_CASE("datagrams: any bytes are read within their end") {
