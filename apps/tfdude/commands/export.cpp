@@ -36,7 +36,7 @@ struct Export final : Question {
     auto written = nlohmann::json::array();
     for (const FrameSpec& frame : *frames) written.push_back(frame.id);
     nlohmann::json json{{"file", file}, {"format", format}, {"frames", written}};
-    if (file == "-") {
+    if (file == "-" || is_standard_output(file)) {
       json["text"] = *text;
       return answer(common, json, *text);
     }
