@@ -20,7 +20,9 @@
 namespace tfdude::cli {
 
 Result<Lines> Lines::open(const std::string& file, std::optional<double> pace) {
-  const int opened = file == "-" ? dup(STDIN_FILENO) : ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  // A pipe without a writer is waited for in fill(), which a signal ends.
+  const int opened = file == "-" ? dup(STDIN_FILENO)
+                                 : ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (opened < 0) {
     return fail(Errc::kConfig, "cannot read " + quote(file) + ": " + std::strerror(errno));
   }
@@ -53,6 +55,7 @@ bool Lines::fill() {
   if (interrupted_) return false;
   std::array<char, 65536> block{};
   const ssize_t size = read(file_.get(), block.data(), block.size());
+  if (size < 0 && (errno == EAGAIN || errno == EINTR)) return true;
   if (size <= 0) return false;
   buffer_.append(block.data(), static_cast<std::size_t>(size));
   return true;

@@ -11,7 +11,7 @@
 namespace tfdude::cli {
 
 /// The lines of a file or of standard input, until its end or an interrupt (SIGINT, SIGTERM, which
-/// the process blocks).
+/// the process blocks). A pipe may get its writer later.
 class Lines {
  public:
   /// @param file  "-": standard input

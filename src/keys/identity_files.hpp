@@ -21,7 +21,7 @@ namespace tfdude::keys {
 /// Reads a file, and then its text by a function. Errors name the file.
 template <class Read>
 [[nodiscard]] auto parse_file(const std::string& path, Read read) -> decltype(read(std::string())) {
-  const auto text = read_text(path);
+  const auto text = read_text(path, Readable::kRegularFile);
   if (!text) return tl::unexpected(text.error());
   auto parsed = read(*text);
   if (!parsed) return fail_at(printable(path), parsed.error());

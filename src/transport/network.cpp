@@ -28,7 +28,7 @@ std::uint64_t hash_of(std::string_view text) {
 std::string network_of(std::uint32_t domain, const std::string& profile) {
   std::string profiles = profile;
   if (!profile.empty() && profile != kLocalProfile) {
-    auto text = read_text(profile);
+    auto text = read_text(profile, Readable::kRegularFile);
     if (!text) return {};
     profiles = *std::move(text);
   }

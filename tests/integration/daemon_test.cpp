@@ -1,6 +1,7 @@
 // The messages of a daemon that cannot serve.
 
 #include <string>
+#include <sys/stat.h>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -27,6 +28,9 @@ TEST_CASE("daemon: wrong arguments and configurations are rejected and named") {
   const auto config = [&directory](const std::string& name, const std::string& text) {
     return directory.write(name, "partition: legs\nframes:\n" + text);
   };
+  // Nobody writes to it.
+  const std::string pipe = directory.path() + "/pipe.xml";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   const std::vector<Refusal> refusals = {
       {{}, {"--partition"}},
       {{"--nonsense"}, {"--nonsense"}},
@@ -40,6 +44,7 @@ TEST_CASE("daemon: wrong arguments and configurations are rejected and named") {
       {{"--partition", "legs", "--profile", "/nowhere/profile.xml"}, {"/nowhere/profile.xml"}},
       {{"--partition", "legs", "--profile", directory.write("broken.xml", "<profiles><")},
        {"broken.xml"}},
+      {{"--partition", "legs", "--profile", pipe}, {pipe, "is not a regular file"}},
       {{"--config", "/nowhere/legs.yaml"}, {"/nowhere/legs.yaml", "No such file"}},
       {{"--partition", "legs", "--config", testing::kArmsFile}, {"'arms'", "'legs'"}},
       {{"--config", config("key.yaml", "  - id: knee\n    colour: red\n")},

@@ -1,11 +1,14 @@
 // Values on the command line: units of angles, many joints, samples from a pipe, points.
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <fcntl.h>
+#include <filesystem>
 #include <string>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <system_error>
 #include <unistd.h>
 #include <utility>
 #include <vector>
@@ -208,6 +211,39 @@ TEST_CASE("values: an interrupt before the first row is no error") {
   CHECK(publish.wait(in_time()) == 0);
   close(writer);
   CHECK(publish.err().empty());
+}
+
+TEST_CASE("values: publishing waits for the writer of a pipe, and a signal ends that") {
+  const Robot robot;
+  const std::string pipe = robot.directory.path() + "/pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  Process publish = robot.domain.start_cli({"publish", pipe});
+  SECTION("a writer comes") {
+    int writer = -1;
+    CHECK(eventually([&] {
+      writer = open(pipe.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+      return writer >= 0;
+    }));
+    const std::string line = "{\"edge\": \"tool0\", \"xyz\": [0, 0, 0.5]}\n";
+    CHECK(write(writer, line.data(), line.size()) == static_cast<ssize_t>(line.size()));
+    close(writer);
+    CHECK(publish.wait(in_time()) == 0);
+    CHECK_THAT(publish.out(), ContainsSubstring("sent         1 lines with 1 values"));
+  }
+  SECTION("a signal comes") {
+    const auto opens = [&] {
+      const std::string held = "/proc/" + std::to_string(publish.pid()) + "/fd";
+      const std::filesystem::directory_iterator files(held);
+      return std::any_of(begin(files), end(files), [&](const auto& file) {
+        std::error_code gone;
+        return std::filesystem::read_symlink(file, gone) == pipe;
+      });
+    };
+    CHECK(eventually(opens));
+    publish.signal(SIGTERM);
+    CHECK(publish.wait(in_time()) == 0);
+    CHECK_THAT(publish.out(), ContainsSubstring("sent         0 lines"));
+  }
 }
 
 TEST_CASE("values: points of one frame are given in another with their covariance") {

@@ -81,7 +81,7 @@ Result<Profiles> Profiles::load(const std::string& file) {
       return Profiles(ending);
     });
   }
-  const auto text = read_text(file);
+  const auto text = read_text(file, Readable::kRegularFile);
   if (!text) return fail_at("profile file", text.error());
   auto own = make_known(*text);
   if (!own) {
