@@ -18,11 +18,16 @@
 #include "answer.hpp"
 
 namespace tfdude::cli {
+namespace {
+
+constexpr std::size_t kLongest = std::size_t{16} << 20U;
+
+}  // namespace
 
 Result<Lines> Lines::open(const std::string& file, std::optional<double> pace) {
   // A pipe without a writer is waited for in fill(), which a signal ends.
-  const int opened = file == "-" ? dup(STDIN_FILENO)
-                                 : ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  const int opened =
+      file == "-" ? dup(STDIN_FILENO) : ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (opened < 0) {
     return fail(Errc::kConfig, "cannot read " + quote(file) + ": " + std::strerror(errno));
   }
@@ -56,20 +61,32 @@ bool Lines::fill() {
   std::array<char, 65536> block{};
   const ssize_t size = read(file_.get(), block.data(), block.size());
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return true;
+  if (size < 0) (void)end_by(std::string("cannot be read: ") + std::strerror(errno));
   if (size <= 0) return false;
   buffer_.append(block.data(), static_cast<std::size_t>(size));
   return true;
 }
 
+// What there is of that line is no line.
+std::nullopt_t Lines::end_by(const std::string& failure) {
+  failure_ = failure;
+  ended_ = true;
+  buffer_ = {};
+  at_ = 0;
+  ++number_;
+  return std::nullopt;
+}
+
 std::optional<std::string> Lines::next() {
   if (!wait_until_due()) return std::nullopt;
   std::size_t end = buffer_.find('\n', at_);
-  while (end == std::string::npos && !ended_) {
+  while (end == std::string::npos && !ended_ && buffer_.size() - at_ <= kLongest) {
     const std::size_t searched = buffer_.size() - at_;
     ended_ = !fill();
     end = buffer_.find('\n', searched);
   }
   if (end == std::string::npos) end = buffer_.size();  // the last line may lack its end
+  if (end - at_ > kLongest) return end_by("it is longer than 16 MiB");
   if (at_ == buffer_.size() && end == buffer_.size()) return std::nullopt;
   std::string line = buffer_.substr(at_, end - at_);
   at_ = std::min(end + 1, buffer_.size());

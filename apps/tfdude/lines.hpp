@@ -11,7 +11,8 @@
 namespace tfdude::cli {
 
 /// The lines of a file or of standard input, until its end or an interrupt (SIGINT, SIGTERM, which
-/// the process blocks). A pipe may get its writer later.
+/// the process blocks). A pipe may get its writer later. No line is longer than 16 MiB, which is
+/// also what is kept of a file without lines.
 class Lines {
  public:
   /// @param file  "-": standard input
@@ -23,6 +24,8 @@ class Lines {
   [[nodiscard]] std::optional<std::string> next();
   /// Whether it was an interrupt that ended the lines.
   [[nodiscard]] bool interrupted() const { return interrupted_; }
+  /// Why the line number() could not be read, which ended the lines; empty: it was not that.
+  [[nodiscard]] const std::string& failure() const { return failure_; }
   /// The number of the line that next() returned, from 1.
   [[nodiscard]] std::size_t number() const { return number_; }
 
@@ -32,6 +35,7 @@ class Lines {
 
   [[nodiscard]] bool wait_until_due();
   [[nodiscard]] bool fill();
+  [[nodiscard]] std::nullopt_t end_by(const std::string& failure);
 
   Descriptor file_;
   Descriptor interrupts_;
@@ -41,6 +45,7 @@ class Lines {
   std::size_t at_ = 0;  // the beginning of the next line in the buffer
   bool ended_ = false;
   bool interrupted_ = false;
+  std::string failure_;
   std::size_t number_ = 0;
 };
 

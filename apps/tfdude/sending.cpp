@@ -48,10 +48,14 @@ Result<void> send_one(Client& client, const Sample& sample, bool acknowledged) {
                                : client.publish_joints(sample.joints, sample.stamp);
 }
 
+void tell(const Lines& lines, const std::string& error) {
+  std::fprintf(stderr, "tfdude: line %zu: %s\n", lines.number(), error.c_str());
+}
+
 // Tells the first errors; a controller's pipe may repeat one a thousand times per second.
 void reject(Sent& sent, const Lines& lines, const Error& error) {
   if (++sent.rejected > kToldErrors) return;
-  std::fprintf(stderr, "tfdude: line %zu: %s\n", lines.number(), error.message.c_str());
+  tell(lines, error.message);
   if (sent.rejected == kToldErrors) std::fputs("tfdude: further errors are only counted\n", stderr);
 }
 
@@ -119,8 +123,12 @@ int SampleLines::send(Client& client, const Common& common, bool acknowledged) c
       reject(sent, *lines, done.error());
     }
   }
-  const auto ended = lines->interrupted() ? Result<void>() : reader.finish();
-  if (!ended) reject(sent, *lines, ended.error());
+  if (!lines->failure().empty()) {
+    ++sent.rejected;
+    tell(*lines, lines->failure());
+  } else if (!lines->interrupted()) {
+    if (const auto ended = reader.finish(); !ended) reject(sent, *lines, ended.error());
+  }
   const auto flushed = client.flush(common.options.timeout);
   sent.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   (void)answer(common,

@@ -246,6 +246,18 @@ TEST_CASE("values: publishing waits for the writer of a pipe, and a signal ends 
   }
 }
 
+TEST_CASE("values: a line without an end is no sample") {
+  const Robot robot;
+  const std::string file =
+      robot.directory.write("long", std::string((std::size_t{16} << 20U) + 1, '0'));
+  const CliResult sent = robot.domain.cli({"publish", file});
+  CHECK(sent.status == 1);
+  CHECK(sent.err == "tfdude: line 1: it is longer than 16 MiB\n");
+  const CliResult rewritten = robot.domain.cli({"rewrite", "tool0", file});
+  CHECK(rewritten.status == 1);
+  CHECK_THAT(rewritten.err, ContainsSubstring("long, line 1: it is longer than 16 MiB"));
+}
+
 TEST_CASE("values: points of one frame are given in another with their covariance") {
   const Robot robot;
   robot.text({"add", "tool", "--parent", "tool0", "--xyz", "1", "2", "3", "--stddev", "0.01",

@@ -54,12 +54,12 @@ struct Rewrite final : FrameCommand {
     if (!lines) return tl::unexpected(lines.error());
     SampleReader reader(common.angles);
     std::vector<EdgeSample> samples;
+    const auto wrong = [&](const std::string& why) {
+      const std::string name = file == "-" ? "standard input" : printable(file);
+      return fail(Errc::kInvalidInput,
+                  name + ", line " + std::to_string(lines->number()) + ": " + why);
+    };
     while (const auto line = lines->next()) {
-      const auto wrong = [&](const std::string& why) {
-        const std::string name = file == "-" ? "standard input" : printable(file);
-        return fail(Errc::kInvalidInput,
-                    name + ", line " + std::to_string(lines->number()) + ": " + why);
-      };
       const auto sample = reader.read(*line);
       if (!sample) return wrong(sample.error().message);
       if (!*sample) continue;
@@ -80,6 +80,7 @@ struct Rewrite final : FrameCommand {
       }
       samples.push_back({*stamp, edges.front().X_PC});
     }
+    if (!lines->failure().empty()) return wrong(lines->failure());
     if (samples.empty()) return fail(Errc::kInvalidInput, quote(file) + " has no samples");
     return samples;
   }
