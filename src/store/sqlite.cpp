@@ -63,8 +63,14 @@ Result<Database> Database::open(const std::string& file) {
   return database;
 }
 
-void Database::tidy_up_at_close() {
-  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+void Database::tidy_up_at_close(bool tidy) {
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, tidy ? 0 : 1, nullptr);
+}
+
+bool Database::is_gone() const {
+  int gone = 0;
+  return sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &gone) == SQLITE_OK &&
+         gone != 0;
 }
 
 Result<void> Database::run(const char* sql) {

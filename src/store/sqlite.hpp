@@ -19,8 +19,8 @@ class Database {
   [[nodiscard]] static Result<Database> open(const std::string& file);
 
   /// From now on, closing merges the log into the file. Without this call, closing leaves the file
-  /// as it was found.
-  void tidy_up_at_close();
+  /// as it was found. @param tidy  false: takes that back
+  void tidy_up_at_close(bool tidy = true);
 
   /// Runs statements that return no rows.
   [[nodiscard]] Result<void> run(const char* sql);
@@ -42,6 +42,8 @@ class Database {
   [[nodiscard]] bool is_read_only() const {
     return sqlite3_db_readonly(handle_.get(), "main") == 1;
   }
+  /// Whether the file is no longer where it was opened: nobody will find what is written to it.
+  [[nodiscard]] bool is_gone() const;
   [[nodiscard]] int code() const { return sqlite3_errcode(handle_.get()); }
   [[nodiscard]] sqlite3* get() const { return handle_.get(); }
 

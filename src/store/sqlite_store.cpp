@@ -38,6 +38,10 @@ class SqliteStore final : public StateStore {
  public:
   SqliteStore(std::string file, StoreSync sync) : file_(std::move(file)), sync_(sync) {}
 
+  ~SqliteStore() override;
+  SqliteStore(const SqliteStore&) = delete;
+  SqliteStore& operator=(const SqliteStore&) = delete;
+
   Result<void> open(const std::string& partition);
 
   Result<StoredState> load() override;
@@ -108,6 +112,11 @@ tl::unexpected<Error> SqliteStore::unreadable(const std::string& why) const {
   }
   return unusable("is damaged (" + printable(why) +
                   "): move it away to start from the configuration, or put a copy of it back");
+}
+
+// The log of another file that is there now is not removed.
+SqliteStore::~SqliteStore() {
+  if (ready_ && database_->is_gone()) database_->tidy_up_at_close(false);
 }
 
 Result<void> SqliteStore::open(const std::string& partition) {
@@ -333,8 +342,11 @@ Result<void> SqliteStore::save(const StateChange& change) {
     done = database_->run("PRAGMA synchronous = NORMAL;");
   }
   written_ = written_ || done;
-  if (done) return {};
-  return unusable("could not be written: " + done.error().message);
+  if (!done) return unusable("could not be written: " + done.error().message);
+  if (!database_->is_gone()) return {};
+  return unusable(
+      "was removed, moved or replaced while it was in use, so changes would be lost: put it back, "
+      "or restart the process with what is there now");
 }
 
 Result<void> SqliteStore::save_frames(const StateChange& change) {

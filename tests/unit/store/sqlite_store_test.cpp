@@ -360,6 +360,47 @@ TEST_CASE("a full disk loses nothing and storing continues once there is room") 
   CHECK(store->load()->frames.size() == static_cast<std::size_t>(kept) + 2);
 }
 
+TEST_CASE("a state file that is removed or moved below its process takes no change") {
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/arms.sqlite";
+  const std::string aside = directory.path() + "/aside.sqlite";
+  const std::string log = file + "-wal";
+  auto store = opened(file);
+  REQUIRE(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  const StateChange more{1, {"late"}, {{"late", "", {}, 1}}, {}};
+  const auto is_refused = [&] {
+    const auto saved = store->save(more);
+    REQUIRE_FALSE(saved);
+    CHECK(saved.error().code == Errc::kState);
+    CHECK_THAT(saved.error().message,
+               ContainsSubstring("state file '" + file + "' was removed, moved or replaced"));
+  };
+  SECTION("removed, with its directory") {
+    std::filesystem::remove_all(directory.path());
+    is_refused();
+    is_refused();
+    store.reset();
+    CHECK_FALSE(std::filesystem::exists(file));
+  }
+  SECTION("moved, until it is put back") {
+    std::filesystem::rename(file, aside);
+    is_refused();
+    std::filesystem::rename(aside, file);
+    CHECK(outcome(store->save(more)) == "ok");
+    store.reset();
+    CHECK(opened(file)->load()->frames.size() == 2);
+  }
+  SECTION("replaced, by one with a log of its own") {
+    std::filesystem::rename(file, aside);
+    std::filesystem::copy_file(aside, file);
+    std::filesystem::rename(log, aside + "-wal");
+    std::ofstream(log) << "another's";
+    is_refused();
+    store.reset();
+    CHECK(std::filesystem::file_size(log) == 9);
+  }
+}
+
 TEST_CASE("a file that cannot be updated to the current format stays unchanged until it can") {
   testing::SmallDisk disk(300);
   if (!disk.mounted()) {
