@@ -10,6 +10,7 @@
 #include "calls/lookup_in_progress.hpp"
 #include "math/observe_beside.hpp"
 #include "partition/latest.hpp"
+#include "partition/observed_instants.hpp"
 
 namespace tfdude {
 namespace {
@@ -177,9 +178,14 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
   loosen(plan_, *edges);
-  const auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
+  ObservedInstants instants(plan_, path, source);
+  instants.name(*edges, !beside_others());
+  auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
       *edges, measurement_.X_AB, source, measurement_.options);
-  if (found) return apply(path, *found);
+  if (found) {
+    instants.settle(*found);
+    return apply(path, *found);
+  }
   return fail_at("the path from " + quote(measurement_.a) + " to " + quote(measurement_.b),
                  found.error());
 }

@@ -7,6 +7,7 @@
 
 #include "math/bound_weights.hpp"
 #include "math/common_errors.hpp"
+#include "math/instant_sources.hpp"
 #include "math/kernel.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
@@ -133,6 +134,11 @@ Matrix6d difference(const Covariance& own, const CommonErrors& common_errors) {
   return root * root.transpose();
 }
 
+Matrix6d sum_of(const Covariance& own, const CommonErrors& common_errors) {
+  if (any_subtracts(common_errors)) return difference(own, common_errors);
+  return nearest_semidefinite(own.matrix() + second_moment(common_errors));
+}
+
 }  // namespace
 
 void add_errors(const CommonErrors& more, CommonErrors& sum) {
@@ -188,10 +194,10 @@ Belief compose(const Belief& X_AB, const Belief& X_BC, Order order) {
 Transform collapse(const Belief& X_AB) {
   Covariance known = X_AB.own;
   if (!X_AB.common_errors.empty()) {
-    known = Covariance::trusted(
-        any_subtracts(X_AB.common_errors)
-            ? difference(X_AB.own, X_AB.common_errors)
-            : nearest_semidefinite(X_AB.own.matrix() + second_moment(X_AB.common_errors)));
+    const bool of_instants = has_instants(X_AB.common_errors);
+    CommonErrors wider = of_instants ? X_AB.common_errors : CommonErrors();
+    if (of_instants) allow_any_relation(wider);
+    known = Covariance::trusted(sum_of(X_AB.own, of_instants ? wider : X_AB.common_errors));
   }
   StatedCovariance stated = X_AB.unknown ? bound(known, *X_AB.unknown) : known;
   stated.set_complete(!X_AB.unspecified);

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
 
-#include "math/low_rank.hpp"
+#include "math/instant_sources.hpp"
+#include "math/joint_covariance.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
 
@@ -18,153 +17,6 @@ namespace tfdude {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
-
-// The joint covariance of all edges, six rows each: own parts, and columns that are added to it or
-// subtracted from it.
-class JointCovariance {
- public:
-  explicit JointCovariance(std::size_t edges)
-      : edges_(static_cast<Eigen::Index>(edges)), columns_(6 * edges_, 0) {}
-
-  void append(const std::vector<Loading>& loadings, bool subtracts) {
-    const Eigen::Index first = columns_.cols();
-    const Eigen::Index more = loadings.front().cols();
-    columns_.conservativeResize(Eigen::NoChange, first + more);
-    for (std::size_t i = 0; i < loadings.size(); ++i) {
-      columns_.block(6 * static_cast<Eigen::Index>(i), first, 6, more) = loadings[i];
-    }
-    signs_.conservativeResize(first + more);
-    signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
-  }
-
-  // Makes the errors of an edge independent of all others.
-  void forget(std::vector<CorrectedError>& edges, std::size_t edge) {
-    auto rows = columns_.middleRows(6 * static_cast<Eigen::Index>(edge), 6);
-    edges[edge].own =
-        nearest_semidefinite(edges[edge].own + rows * signs_.asDiagonal() * rows.transpose());
-    rows.setZero();
-  }
-
-  // How much the errors of two edges are correlated: the sum of the squares of the correlations of
-  // their elements.
-  [[nodiscard]] double correlation(const std::vector<CorrectedError>& edges, std::size_t a,
-                                   std::size_t b) const {
-    const auto F_a = columns_.middleRows(6 * static_cast<Eigen::Index>(a), 6);
-    const auto F_b = columns_.middleRows(6 * static_cast<Eigen::Index>(b), 6);
-    const Matrix6d both = F_a * signs_.asDiagonal() * F_b.transpose();
-    const auto inverse_deviations = [&](const auto& F, std::size_t i) {
-      const Twist variances = edges[i].own.diagonal() + (F.cwiseAbs2() * signs_);
-      return Twist(variances.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; }));
-    };
-    return (inverse_deviations(F_a, a).asDiagonal() * both *
-            inverse_deviations(F_b, b).asDiagonal())
-        .squaredNorm();
-  }
-
-  [[nodiscard]] bool empty() const { return columns_.cols() == 0; }
-
-  // Writes the same joint covariance with few columns, as common errors of new sources. All edges
-  // that share the sources are here. Columns with signs keep the most digits, so they are kept
-  // while there are few.
-  void give(std::vector<CorrectedError>& edges, const std::string& name) const {
-    const Signed own = with_signs();
-    const Eigen::Index count = own.less.cols() + own.more.cols();
-    if (count <= kMaxLoadingColumns) return give_with_signs(edges, name, own);
-    auto hubs = by_hubs(dense(edges), rounding(edges), std::min(count, kMostColumns));
-    if (!hubs) return give_with_signs(edges, name, own);
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      edges[i].own = hubs->own.middleRows(6 * static_cast<Eigen::Index>(i), 6);
-    }
-    add_common(edges, name, hubs->F, false);
-  }
-
- private:
-  // Of all sources together.
-  static constexpr Eigen::Index kMostColumns = 4 * kMaxLoadingColumns;
-  // Of the sum of what is subtracted from each other.
-  static constexpr double kRounding = 1e-14;
-
-  // The fewest columns with the same sum.
-  struct Signed {
-    Matrix less;
-    Matrix more;
-  };
-
-  // Each row is scaled to one before, so that no edge and no unit is judged by another.
-  [[nodiscard]] Signed with_signs() const {
-    const Eigen::VectorXd size = columns_.rowwise().norm();
-    const Eigen::VectorXd unit =
-        size.unaryExpr([](double one) { return one > 0 ? 1.0 / one : 0.0; });
-    const Eigen::HouseholderQR<Matrix> qr(unit.asDiagonal() * columns_);
-    const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
-    const Matrix thin = qr.householderQ() * Matrix::Identity(columns_.rows(), rank);
-    const Matrix upper = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
-    const Eigen::SelfAdjointEigenSolver<Matrix> solver(upper * signs_.asDiagonal() *
-                                                       upper.transpose());
-    const Eigen::VectorXd& values = solver.eigenvalues();  // ascending
-    const Matrix vectors = size.asDiagonal() * thin * solver.eigenvectors();
-    const double least = std::numeric_limits<double>::epsilon() * values.cwiseAbs().maxCoeff();
-    Signed found{Matrix(columns_.rows(), 0), Matrix(columns_.rows(), 0)};
-    const auto put = [&](Matrix& to, Eigen::Index k) {
-      to.conservativeResize(Eigen::NoChange, to.cols() + 1);
-      to.rightCols(1) = vectors.col(k) * std::sqrt(std::abs(values[k]));
-    };
-    for (Eigen::Index k = 0; k < rank && values[k] < -least; ++k) put(found.less, k);
-    for (Eigen::Index k = rank; k-- > 0 && values[k] > least;) put(found.more, k);
-    return found;
-  }
-
-  // Columns beyond the maximum that subtract may be dropped. Those that add go to the own parts: no
-  // correlation of n parts exceeds n times their sum.
-  static void give_with_signs(std::vector<CorrectedError>& edges, const std::string& name,
-                              const Signed& columns) {
-    const auto& [less, more] = columns;
-    for (Eigen::Index k = kMostColumns; k < more.cols(); ++k) {
-      for (std::size_t i = 0; i < edges.size(); ++i) {
-        const Twist part = more.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
-        edges[i].own += static_cast<double>(edges.size()) * part * part.transpose();
-      }
-    }
-    add_common(edges, name, less.leftCols(std::min(less.cols(), kMostColumns)), true);
-    add_common(edges, name, more.leftCols(std::min(more.cols(), kMostColumns)), false);
-  }
-
-  // All edges get the first source, by which others see that it is the same observation.
-  static void add_common(std::vector<CorrectedError>& edges, const std::string& name,
-                         const Matrix& all, bool subtracts) {
-    for (Eigen::Index first = 0; first < all.cols(); first += kMaxLoadingColumns) {
-      const Eigen::Index count = std::min(kMaxLoadingColumns, all.cols() - first);
-      const std::string source =
-          first == 0 ? name : name + "+" + std::to_string(first / kMaxLoadingColumns);
-      for (std::size_t i = 0; i < edges.size(); ++i) {
-        const Loading part = all.block(6 * static_cast<Eigen::Index>(i), first, 6, count);
-        if (first > 0 && part.isZero(0)) continue;
-        edges[i].common_errors.push_back({source, subtracts, part});
-      }
-    }
-  }
-
-  [[nodiscard]] Matrix dense(const std::vector<CorrectedError>& edges) const {
-    Matrix P = columns_ * signs_.asDiagonal() * columns_.transpose();
-    for (Eigen::Index i = 0; i < edges_; ++i) {
-      P.block<6, 6>(6 * i, 6 * i) += edges[static_cast<std::size_t>(i)].own;
-    }
-    return P;
-  }
-
-  // The root of the rounding of what was added and subtracted in each row.
-  [[nodiscard]] Eigen::VectorXd rounding(const std::vector<CorrectedError>& edges) const {
-    Eigen::VectorXd sums = columns_.rowwise().squaredNorm();
-    for (Eigen::Index i = 0; i < edges_; ++i) {
-      sums.segment<6>(6 * i) += edges[static_cast<std::size_t>(i)].own.diagonal();
-    }
-    return (kRounding * sums).cwiseSqrt();
-  }
-
-  const Eigen::Index edges_;
-  Matrix columns_;
-  Eigen::VectorXd signs_;
-};
 
 // If more edges are correlated than may be, forgets that of those beside the path which are the
 // least correlated with it.
@@ -203,12 +55,65 @@ void give(const JointCovariance& joint, std::vector<CorrectedError>& edges,
   }
 }
 
+// The errors of sources at instants. They stay apart from what observations have found, as it is
+// not known how they are correlated with their sources (instant_sources.hpp). None subtracts.
+class InstantErrors {
+ public:
+  void append(const JointPrior::Source& source, const std::vector<Loading>& loadings) {
+    if (is_of_one_instant(source.name)) {
+      kept_.push_back({source.name, false, loadings});
+      return;
+    }
+    const std::string said(said_source(source.name));
+    merged_.try_emplace(said, loadings.size()).first->second.append(loadings, false);
+  }
+
+  // After all others, by which an observation is recognised.
+  void give(std::vector<CorrectedError>& edges, const std::string& name) const {
+    for (const JointPrior::Source& source : kept_) {
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        if (source.loadings[i].isZero(0)) continue;
+        edges[i].common_errors.push_back({source.name, false, source.loadings[i]});
+      }
+    }
+    for (const auto& [said, joint] : merged_) joint.give_of(edges, name, said);
+    for (CorrectedError& edge : edges) {
+      if (edge.forgotten) make_own(edge);
+    }
+  }
+
+ private:
+  static void make_own(CorrectedError& edge) {
+    auto& errors = edge.common_errors;
+    const auto of_instants = std::stable_partition(
+        errors.begin(), errors.end(),
+        [](const CommonError& one) { return said_source(one.source).empty(); });
+    for (auto one = of_instants; one != errors.end(); ++one) {
+      edge.own += one->loading * one->loading.transpose();
+    }
+    errors.erase(of_instants, errors.end());
+  }
+
+  std::vector<JointPrior::Source> kept_;
+  std::map<std::string, JointCovariance> merged_;
+};
+
+// Where the errors of sources of earlier observations go.
+struct Left {
+  JointCovariance observed;
+  InstantErrors of_instants;
+};
+
 // Gives the edges their new loadings of a source. Those of earlier observations are merged into
-// `observed`, unless it is null.
-void carry(const JointPrior::Source& source, const std::vector<Loading>& loadings,
-           JointCovariance* observed, std::vector<CorrectedError>& edges) {
-  if (observed != nullptr && is_observed({source.name, source.subtracts, {}})) {
-    observed->append(loadings, source.subtracts);
+// `left`, unless it is null.
+void carry(const JointPrior::Source& source, const std::vector<Loading>& loadings, Left* left,
+           std::vector<CorrectedError>& edges) {
+  if (left != nullptr && !said_source(source.name).empty()) {
+    left->of_instants.append(source, loadings);
+    return;
+  }
+  if (left != nullptr && is_observed({source.name, source.subtracts, {}})) {
+    left->observed.append(loadings, source.subtracts);
     return;
   }
   for (std::size_t i = 0; i < edges.size(); ++i) {
@@ -316,12 +221,13 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
                              : joined(own - gains[0] * (H[edges[0]] * own), gains[0] * R);
     corrected[0].own = rest * rest.transpose();
   }
-  JointCovariance observed(edges.size());
+  Left left{JointCovariance(edges.size()), {}};
+  JointCovariance& observed = left.observed;
   for (const JointPrior::Source& source : prior.sources()) {
     const Loading on_path = source.on_path(prior, H);
     std::vector<Loading> loadings = source.loadings;
     for (std::size_t i = 0; i < edges.size(); ++i) loadings[i] -= gains[i] * on_path;
-    carry(source, loadings, alone || !merge ? nullptr : &observed, corrected);
+    carry(source, loadings, alone || !merge ? nullptr : &left, corrected);
   }
   if (alone) return corrected;
   if (const auto edge = dominant(prior, H, R, S)) {
@@ -338,6 +244,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
   if (!prior.sources().empty()) observed.append(more, false);
   forget_least(prior, observed, corrected);
   give(observed, corrected, new_source);
+  left.of_instants.give(corrected, new_source);
   return corrected;
 }
 
@@ -349,11 +256,12 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
   for (const Matrix6d& own : prior.own()) determined.push_back({own, {}, false});
   const Loading noise = G * R;
   determined.push_back({noise * noise.transpose(), {}, false});
-  JointCovariance observed(determined.size());
+  Left left{JointCovariance(determined.size()), {}};
+  JointCovariance& observed = left.observed;
   for (const JointPrior::Source& source : prior.sources()) {
     std::vector<Loading> loadings = source.loadings;
     loadings.emplace_back(-G * source.on_path(prior, linear.H));
-    carry(source, loadings, merge ? &observed : nullptr, determined);
+    carry(source, loadings, merge ? &left : nullptr, determined);
   }
   const Factor whole(prior.own_on_path(linear.H));
   if (whole.rank() > 0) {
@@ -362,6 +270,7 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
   }
   forget_least(prior, observed, determined);
   if (!observed.empty()) give(observed, determined, new_source);
+  left.of_instants.give(determined, new_source);
   return determined;
 }
 

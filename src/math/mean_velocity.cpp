@@ -7,6 +7,7 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "math/drift.hpp"
+#include "math/instant_sources.hpp"
 
 namespace tfdude {
 namespace {
@@ -67,17 +68,19 @@ class Sum {
   }
 
   void finish(MeanVelocity& velocity) {
+    std::vector<OfSource> parts;
     for (Shared& source : shared_) {
       if (source.lasts) {
         Loading difference = -source.before;
         add_columns(difference, source.after);
-        total_ += squared(difference);
+        parts.emplace_back(source.name, squared(difference));
       } else {
-        total_ += bound(squared(source.before), squared(source.after));
+        parts.emplace_back(source.name, bound(squared(source.before), squared(source.after)));
         bound_ = true;
       }
       velocity.sources.push_back(source.name);
     }
+    total_ += sum_of_sources(parts, bound_);
     velocity.covariance = unknown_ ? bound(total_, *unknown_) : total_;
     velocity.bound = bound_;
   }

@@ -8,6 +8,7 @@
 #include "tfdude/base/id.hpp"
 
 #include "base/stamp.hpp"
+#include "math/instant_sources.hpp"
 
 namespace tfdude {
 namespace {
@@ -62,7 +63,9 @@ void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t 
                  std::vector<std::string>& lacking) {
   const auto& own = path.edges[edge].X_PC.common_errors;
   const auto& with = path.correlations[edge].observed_with;
-  const auto source = std::find_if(own.begin(), own.end(), is_observed);
+  const auto source = std::find_if(own.begin(), own.end(), [](const CommonError& one) {
+    return is_observed(one) && said_source(one.source).empty();
+  });
   if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) return;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     const std::string& id = plan.edges[k].info.id;

@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/common_errors.hpp"
+#include "math/instant_sources.hpp"
 #include "tree/forest_impl.hpp"
 
 // How the errors of edges are correlated.
@@ -15,7 +17,10 @@ Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
 }
 
 StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
-  StampedTransform found{collapse(X), stamp, {order, X.unknown.has_value(), {}}};
+  std::vector<CommonError> errors =
+      has_instants(X.common_errors) ? X.common_errors : std::vector<CommonError>();
+  const bool bounded = X.unknown || allow_any_relation(errors);
+  StampedTransform found{collapse(X), stamp, {order, bounded, {}}};
   std::vector<std::string>& sources = found.basis.sources;
   for (const CommonError& common_error : X.common_errors) sources.push_back(common_error.source);
   std::sort(sources.begin(), sources.end());
@@ -59,8 +64,11 @@ void Forest::Impl::unlink(const HeldVersion& edge, const std::vector<std::string
 Result<void> Forest::Impl::check_room(const HeldVersion& edge, const Correlation& said) {
   if (edge.correlation == nullptr || !edge.correlation->revised()) return {};
   const auto& before = edge.correlation->now().common_errors;
+  const auto is_left = [&](const CommonError& one) {
+    return of_same_source(edge.correlation->said().common_errors, one) == nullptr;
+  };
   const auto observed =
-      static_cast<std::size_t>(std::count_if(before.begin(), before.end(), is_observed));
+      static_cast<std::size_t>(std::count_if(before.begin(), before.end(), is_left));
   if (said.common_errors.size() + observed <= kMaxCommonErrors) return {};
   return fail(Errc::kInvalidInput, std::to_string(said.common_errors.size()) + " sources and " +
                                        std::to_string(observed) +
@@ -79,8 +87,13 @@ void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) 
   const Correlation& before = fresh.correlation->now();
   Correlation now = said;
   now.observed_with = before.observed_with;
+  const auto is_said = [](const Correlation& by, const CommonError& one) {
+    return of_same_source(by.common_errors, one) != nullptr;
+  };
   std::copy_if(before.common_errors.begin(), before.common_errors.end(),
-               std::back_inserter(now.common_errors), is_observed);
+               std::back_inserter(now.common_errors), [&](const CommonError& one) {
+                 return !is_said(fresh.correlation->said(), one) && !is_said(said, one);
+               });
   correlate(fresh, said, std::move(now));
 }
 

@@ -10,6 +10,7 @@
 #include "math/bound_weights.hpp"
 #include "math/common_errors.hpp"
 #include "math/drift.hpp"
+#include "math/instant_sources.hpp"
 #include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
@@ -69,9 +70,16 @@ class TwoWays {
     for (const std::string& source : sources()) relate_source(source);
   }
 
-  [[nodiscard]] Transform X_AB(Order order) const {
+  [[nodiscard]] Transform X_AB(Order order) {
     Belief whole = compose(inverse(along(a_.edges, order)), along(b_.edges, order), order);
     whole.unknown = unknown_;
+    // A source at A and at B is of one kind here: both have been allowed for.
+    for (CommonError& one : whole.common_errors) {
+      const std::string at_a(kAtA);
+      if (one.source.rfind(at_a, 0) == 0) one.source.erase(0, at_a.size());
+    }
+    std::vector<CommonError> wider = whole.common_errors;
+    bound_ = allow_any_relation(wider) || bound_;
     return collapse(whole);
   }
   [[nodiscard]] bool is_bound() const { return bound_ || unknown_; }

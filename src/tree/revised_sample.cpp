@@ -71,6 +71,16 @@ Covariance with_walk(const Covariance& interpolated, const Twist& xi, double s,
   return bound(interpolated, Covariance::trusted(correlated)) + Covariance::trusted(bridge.rest);
 }
 
+// Of a sample as it was given, with the errors that are said of its edge.
+Covariance with_said(const Transform& G_PC, const Correlation* said) {
+  Covariance all = G_PC.covariance.of_specified();
+  if (said == nullptr) return all;
+  for (const CommonError& one : said->common_errors) {
+    all += Covariance::trusted(Matrix6d(one.loading * one.loading.transpose()));
+  }
+  return all;
+}
+
 // The covariance of X is that of the whole error, of which the common errors are a part.
 CorrelatedValue split(Transform X, std::vector<CommonError> common_errors, bool unknown) {
   Matrix6d own = X.covariance.of_specified().matrix();
@@ -194,7 +204,7 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
     // that this counts s times: its variance s², of which the newest sample has 1.
     if (complete) X.covariance += walked(walk->density, ahead, (1.0 + s) * walk->seconds);
   } else {
-    const Covariance of_twist = bound(G0.covariance.of_specified(), G1.covariance.of_specified());
+    const Covariance of_twist = bound(with_said(G0, said), with_said(G1, said));
     X.covariance =
         bound(offset, Covariance::trusted(Matrix6d(beyond * beyond * of_twist.matrix())));
     complete = complete && G0.covariance.complete() && G1.covariance.complete();

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tfdude/base/time.hpp"
+#include "tfdude/math/belief.hpp"
+
+// A source that dynamic edges name is one error an instant. What an observation leaves of it on
+// other edges is the error of that instant only, under a name of its own. How this is correlated
+// with the source at other instants, and on edges that were not observed, is not known.
+namespace tfdude {
+
+/// The name of a source's error at an instant, the same for all observations of that instant.
+[[nodiscard]] std::string instant_source(std::string_view source, Time stamp);
+
+/// The name for the errors of a source at several instants, of which an observation makes one.
+/// @param observation  the name of the observation's source
+[[nodiscard]] std::string merged_source(std::string_view observation, std::string_view source);
+
+/// Another name for the error of one instant, which says that it may be merged with others.
+[[nodiscard]] std::string as_merged(std::string_view of_one_instant);
+
+/// The source of whose error at some instants this is; empty: of none. Long names are
+/// shortened.
+[[nodiscard]] std::string_view said_source(std::string_view name);
+
+/// Whether it is the error of one instant, on its own.
+[[nodiscard]] bool is_of_one_instant(std::string_view name);
+
+/// Whether the name is that of the source itself, which said_source() may have shortened.
+[[nodiscard]] bool is_source_itself(std::string_view name, std::string_view said);
+
+/// Whether any of them is the error of a source at some instants.
+[[nodiscard]] bool has_instants(const std::vector<CommonError>& common_errors);
+
+/// Makes errors of a source, and of the same source at some instants, as large as suffices for any
+/// correlation of both. @return whether there were any
+bool allow_any_relation(std::vector<CommonError>& common_errors);
+
+/// A covariance with the name of the source that it comes from.
+using OfSource = std::pair<std::string, Covariance>;
+
+/// The sum, by the same rule. @param bounded  set to true if there were any
+[[nodiscard]] Covariance sum_of_sources(const std::vector<OfSource>& parts, bool& bounded);
+
+}  // namespace tfdude

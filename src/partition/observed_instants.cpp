@@ -1,0 +1,175 @@
+#include "partition/observed_instants.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "tfdude/types/joint_spec.hpp"
+
+#include "math/common_errors.hpp"
+#include "math/instant_sources.hpp"
+
+namespace tfdude {
+namespace {
+
+bool is_of_joint(const std::string& source) { return source.rfind(shared_source(""), 0) == 0; }
+
+bool has_named(const Belief& X, const std::string& name) {
+  return std::any_of(X.common_errors.begin(), X.common_errors.end(), [&](const CommonError& one) {
+    return one.source == name && !one.loading.isZero(0);
+  });
+}
+
+bool has_instants_of(const std::vector<ObservedEdge>& edges, const std::string& source) {
+  return std::any_of(edges.begin(), edges.end(), [&](const ObservedEdge& edge) {
+    const auto& errors = edge.X_PC.common_errors;
+    return std::any_of(errors.begin(), errors.end(), [&](const CommonError& one) {
+      const auto said = said_source(one.source);
+      return !said.empty() && is_source_itself(source, said);
+    });
+  });
+}
+
+// Enough for any correlation of a source with what is left of it at some instants.
+void count_twice(std::vector<ObservedEdge>& edges, const std::string& source) {
+  for (ObservedEdge& edge : edges) {
+    for (CommonError& one : edge.X_PC.common_errors) {
+      const auto said = said_source(one.source);
+      const bool of_instants = !said.empty() && is_source_itself(source, said);
+      if (of_instants || one.source == source) one.loading *= std::sqrt(2.0);
+    }
+  }
+}
+
+// If one observation has taken a source for that of an instant, its error was the source's.
+void make_lasting(std::vector<ObservedEdge>& edges, const std::string& source) {
+  std::vector<std::string> names;
+  for (const ObservedEdge& edge : edges) {
+    for (const CommonError& one : edge.X_PC.common_errors) {
+      const auto said = said_source(one.source);
+      if (said.empty() || !is_source_itself(source, said)) continue;
+      if (std::count(names.begin(), names.end(), one.source) == 0) names.push_back(one.source);
+    }
+  }
+  const bool is_one = names.size() == 1 && is_of_one_instant(names.front());
+  if (!is_one) return;
+  for (ObservedEdge& edge : edges) {
+    std::vector<CommonError> errors = std::move(edge.X_PC.common_errors);
+    edge.X_PC.common_errors.clear();
+    for (CommonError& one : errors) {
+      if (one.source == names.front()) one.source = source;
+    }
+    add_errors(errors, edge.X_PC.common_errors);
+  }
+}
+
+}  // namespace
+
+// A source that edges name.
+struct ObservedInstants::Use {
+  std::string source;
+  bool lasts = false;  // of a static edge, or one that drifts
+};
+
+ObservedInstants::ObservedInstants(const ObservePlan& plan, const ObservedPath& path,
+                                   std::string source)
+    : plan_(plan), path_(path), source_(std::move(source)) {}
+
+// Absent: the edge is static, or drifts.
+std::optional<Time> ObservedInstants::instant_of(std::size_t k) const {
+  const ObservedPath::Row& row = path_.rows[k];
+  const ObservePlan::Edge& edge = plan_.edges[row.edge];
+  const PathCorrelation& correlation = path_.correlations[row.edge];
+  if (!is_moving(edge.info.id, correlation) || is_drifting(edge.info.id, correlation)) {
+    return std::nullopt;
+  }
+  if (row.stamp) return row.stamp;
+  return edge.way == ObservedEdge::Way::kBeside ? path_.seen[edge.part].stamp : path_.stamp;
+}
+
+// One beside the path does only if it was observed.
+bool ObservedInstants::takes_part(const ObservedEdge& edge) const {
+  const auto& errors = edge.X_PC.common_errors;
+  return edge.way != ObservedEdge::Way::kBeside ||
+         std::any_of(errors.begin(), errors.end(), is_observed);
+}
+
+std::vector<ObservedInstants::Use> ObservedInstants::uses(
+    const std::vector<ObservedEdge>& edges) const {
+  std::vector<Use> all;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (!takes_part(edges[k])) continue;
+    const bool lasts = !instant_of(k);
+    for (const CommonError& one : edges[k].X_PC.common_errors) {
+      if (is_observed(one)) continue;
+      auto use = std::find_if(all.begin(), all.end(),
+                              [&](const Use& other) { return other.source == one.source; });
+      if (use == all.end()) use = all.insert(use, {one.source});
+      use->lasts = use->lasts || lasts;
+    }
+  }
+  return all;
+}
+
+void ObservedInstants::rename(std::vector<ObservedEdge>& edges, const Use& use) {
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (!takes_part(edges[k])) continue;
+    const auto at = instant_of(k);
+    for (CommonError& one : edges[k].X_PC.common_errors) {
+      if (one.source != use.source) continue;
+      one.source =
+          use.lasts || !at ? merged_source(source_, use.source) : instant_source(use.source, *at);
+      renamed_.push_back({k, use.source, one.source});
+    }
+  }
+}
+
+void ObservedInstants::name(std::vector<ObservedEdge>& edges, bool merge) {
+  for (const Use& use : uses(edges)) {
+    const bool of_joint = is_of_joint(use.source);
+    if (use.lasts && of_joint && has_instants_of(edges, use.source)) count_twice(edges, use.source);
+    if (!use.lasts || of_joint) {
+      rename(edges, use);
+    } else if (merge) {
+      make_lasting(edges, use.source);
+    }
+  }
+  if (!merge) return;
+  for (ObservedEdge& edge : edges) {
+    for (CommonError& one : edge.X_PC.common_errors) {
+      if (!is_of_one_instant(one.source)) continue;
+      const std::string said(said_source(one.source));
+      const bool here = path_.stamp && one.source == instant_source(said, *path_.stamp);
+      if (!here) one.source = as_merged(one.source);
+    }
+  }
+}
+
+// Whether another edge than those that named it has a share.
+bool ObservedInstants::is_shared(const Observation& found, const std::string& name) const {
+  for (std::size_t k = 0; k < found.edges.size(); ++k) {
+    if (!has_named(found.edges[k].X_PC, name)) continue;
+    const bool named = std::any_of(renamed_.begin(), renamed_.end(), [&](const Renamed& one) {
+      return one.edge == k && one.now == name;
+    });
+    if (!named) return true;
+  }
+  return false;
+}
+
+void ObservedInstants::settle(Observation& found) const {
+  if (!found.accepted) return;
+  for (const Renamed& one : renamed_) {
+    ObservedResult& edge = found.edges[one.edge];
+    if (is_shared(found, one.now)) {
+      edge.corrected = true;
+      continue;
+    }
+    for (CommonError& error : edge.X_PC.common_errors) {
+      if (error.source == one.now) error.source = one.before;
+    }
+  }
+}
+
+}  // namespace tfdude

@@ -1,0 +1,238 @@
+// Sources of errors that dynamic edges name, over observations: one error an instant.
+
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tfdude/client/node.hpp"
+
+#include "support/catch.hpp"
+#include "support/forest_support.hpp"
+#include "support/joint_frames.hpp"
+#include "support/networks.hpp"
+
+// All is on one line, so that errors are linear in what disturbs: each is found from one run an
+// independent disturbance, without any model of the filter.
+namespace tfdude {
+namespace {
+
+using testing::along_x;
+using testing::Approx;
+using testing::following;
+using testing::revolute_named;
+
+constexpr double kSupply = 0.03;    // of each sample [m]
+constexpr double kSighting = 0.01;  // [m]
+
+Covariance on_line(double variance) {
+  Covariance::Upper upper{};
+  upper[0] = variance;
+  return Covariance::trusted(upper);
+}
+
+Time at(int step) { return Time(std::chrono::milliseconds(100 * (step + 1))); }
+
+Loading loading(double by) {
+  Loading F = Loading::Zero(6, 1);
+  F(0, 0) = by;
+  return F;
+}
+
+struct Seen {
+  std::string from;
+  int step;
+  std::optional<std::string> declared{};  // a static edge that names the source from now on
+};
+
+struct Asked {
+  std::string from;
+  std::string to;
+  int step;
+};
+
+constexpr int kSteps = 6;
+
+// Of two owners: world -> left and world -> right are told at each step with the same error,
+// right's the other way round. world -> post -> object stand.
+class Line {
+ public:
+  // @param disturbed  which of the errors is one standard deviation; the others are zero
+  Line(int disturbed, bool lasting) : disturbed_(disturbed), lasting_(lasting) {
+    const auto moving = [](const std::string& id) {
+      FrameSpec frame{id, "world", Transform::exact({})};
+      frame.timing = EdgeTiming();
+      frame.timing->moving = true;
+      return frame;
+    };
+    robot_.emplace(Node::open(network_.join(), "robot",
+                              {{"world", "", {}},
+                               moving("left"),
+                               {"object", "post", {}},
+                               {"post", "world", Transform::exact(along_x(1).pose)}})
+                       .value());
+    other_.emplace(Node::open(network_.join(), "other", {moving("right")}).value());
+    REQUIRE(robot_->correlate("left", {false, {{"supply", false, loading(kSupply)}}, {}}));
+    REQUIRE(other_->correlate("right", {false, {{"supply", false, loading(-kSupply)}}, {}}));
+  }
+
+  void tell(int step) {
+    const double error = supply(step);
+    REQUIRE(robot_->update("left", Transform::exact(along_x(error).pose), at(step)));
+    REQUIRE(other_->update("right", Transform::exact(along_x(-error).pose), at(step)));
+  }
+
+  void see(const Seen& seen, int number) {
+    if (seen.declared) {
+      const Correlation said{false, {{"supply", false, loading(kSupply)}}, {}};
+      REQUIRE(robot_->correlate(*seen.declared, said));
+      REQUIRE(robot_->update(*seen.declared, Transform::exact(along_x(1 + supply(0)).pose)));
+    }
+    const double there = seen.from == "post" ? 0 : 1;
+    const Transform Z{along_x(there + kSighting * drawn(kSteps + number)).pose,
+                      on_line(kSighting * kSighting)};
+    const auto found = other_->observe(seen.from, "object", Z, at(seen.step), {1.0, true});
+    INFO("from " << seen.from << " at " << seen.step);
+    REQUIRE(found);
+    REQUIRE(found->accepted);
+  }
+
+  [[nodiscard]] StampedTransform asked(const Asked& ask) {
+    Query query;
+    query.at = at(ask.step);
+    const auto X = other_->lookup(ask.from, ask.to, query);
+    REQUIRE(X);
+    return *X;
+  }
+
+ private:
+  [[nodiscard]] double drawn(int number) const { return number == disturbed_ ? 1 : 0; }
+  [[nodiscard]] double supply(int step) const { return kSupply * drawn(lasting_ ? 0 : step); }
+
+  LoopbackNetwork network_;
+  std::optional<Node> robot_;
+  std::optional<Node> other_;
+  const int disturbed_;
+  const bool lasting_;  // the error of all steps is one
+};
+
+// What each answer claims, by the variance that it truly has.
+std::vector<double> ratios(const std::vector<Seen>& plan, const std::vector<Asked>& asked,
+                           bool lasting = false) {
+  std::vector<double> squares(asked.size());
+  std::vector<double> claimed(asked.size());
+  for (int disturbed = 0; disturbed < kSteps + static_cast<int>(plan.size()); ++disturbed) {
+    Line line(disturbed, lasting);
+    std::size_t next = 0;
+    for (int step = 0; step < kSteps; ++step) {
+      line.tell(step);
+      for (; next < plan.size() && plan[next].step <= step; ++next) {
+        line.see(plan[next], static_cast<int>(next));
+      }
+    }
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      const StampedTransform X = line.asked(asked[i]);
+      const double truth = asked[i].to == "object" ? (asked[i].from == "post" ? 0 : 1) : 0;
+      const double error = X.pose.translation().x() - truth;
+      squares[i] += error * error;
+      claimed[i] = X.covariance.if_complete()->upper()[0];
+    }
+  }
+  std::vector<double> found;
+  for (std::size_t i = 0; i < asked.size(); ++i) found.push_back(claimed[i] / squares[i]);
+  return found;
+}
+
+const std::vector<Asked> kAll = {{"left", "object", 5},  {"right", "object", 5},
+                                 {"world", "object", 5}, {"left", "object", 3},
+                                 {"right", "object", 3}, {"left", "right", 5}};
+
+void check_honest(const std::vector<double>& found, double most) {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    INFO("from " << kAll[i].from << " to " << kAll[i].to << " at " << kAll[i].step << ": "
+                 << found[i]);
+    CHECK(found[i] > 1 - 1e-6);
+    CHECK(found[i] < most);
+  }
+}
+
+TEST_CASE("instants: a sample has another error of its source than the one that was observed") {
+  const auto found = ratios({{"left", 3}}, kAll);
+  check_honest(found, 2 + 1e-6);
+  INFO("just seen");
+  CHECK(found[3] == Approx(1).epsilon(1e-6));
+  CHECK(found[5] == Approx(1).epsilon(1e-6));
+}
+
+TEST_CASE("instants: sightings of many samples are as good as independent ones") {
+  const auto found =
+      ratios({{"left", 0}, {"left", 1}, {"left", 2}, {"left", 3}, {"left", 4}, {"left", 5}}, kAll);
+  INFO("in the world: " << found[2]);
+  CHECK(found[0] == Approx(1).epsilon(1e-6));
+  CHECK(found[2] == Approx(1).epsilon(1e-6));
+}
+
+TEST_CASE("instants: edges of several owners with one source share its error at an instant") {
+  check_honest(ratios({{"left", 3}, {"right", 3}}, kAll), 8);
+  check_honest(ratios({{"left", 5}, {"right", 5}, {"left", 5}}, kAll), 8);
+  // Those that come late, too.
+  check_honest(ratios({{"left", 5}, {"left", 3}, {"right", 3}}, kAll), 30);
+}
+
+TEST_CASE("instants: a source that also a static edge names is one error for all time") {
+  const std::vector<Asked> asked = {
+      {"left", "object", 5}, {"world", "object", 5}, {"post", "object", 5}, {"left", "object", 4}};
+  const std::vector<std::vector<Seen>> plans = {
+      {{"left", 1, "post"}, {"left", 3}, {"left", 5}},
+      {{"left", 1}, {"left", 3, "post"}, {"left", 5}},  // it was observed before that was declared
+      {{"left", 1}, {"left", 3, "post"}, {"post", 4}, {"left", 5}}};
+  for (const auto& plan : plans) {
+    const auto found = ratios(plan, asked, true);
+    INFO("plan " << &plan - plans.data());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      INFO(asked[i].from << ": " << found[i]);
+      CHECK(found[i] > 1 - 1e-6);
+      CHECK(found[i] < 6);
+    }
+  }
+}
+
+// base -> finger and base -> thumb, which mimics it; base -> object.
+TEST_CASE("instants: a joint that others mimic has another error in its next sample") {
+  JointSpec leader = revolute_named("j");
+  leader.coupled = true;
+  for (const bool stamped : {true, false}) {
+    INFO((stamped ? "stamped" : "unstamped"));
+    LoopbackNetwork network;
+    Node node = Node::open(network.join(), "robot",
+                           {{"base", "", {}},
+                            testing::moved_by("finger", "base", leader),
+                            testing::moved_by("thumb", "base", following("k", "j", 1, 0)),
+                            {"object", "base", {along_x(2).pose, StatedCovariance::unspecified()}}})
+                    .value();
+    const auto turn = [&](int step) {
+      const std::optional<Time> stamp = stamped ? std::optional<Time>(at(step)) : std::nullopt;
+      REQUIRE(node.update_joints({"j"}, {0.3}, {1e-4}, stamp));
+    };
+    const auto sigma = [&](const std::string& from) {
+      const auto X = node.lookup(from, "object", Query{});
+      REQUIRE(X);
+      return X->covariance.if_complete()->stddev()[5];
+    };
+    turn(0);
+    const auto Z = node.lookup("finger", "object");
+    REQUIRE(Z);
+    const Transform seen{Z->pose, *Covariance::from_stddev({1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4})};
+    REQUIRE(node.observe("finger", "object", seen).value().accepted);
+    CHECK(sigma("finger") == Approx(1e-4).epsilon(1e-6));
+    turn(1);
+    INFO(sigma("finger"));
+    CHECK(sigma("finger") >= std::sqrt(2e-4) * (1 - 1e-6));
+    CHECK(sigma("finger") < 2.1e-2);
+    CHECK(sigma("thumb") >= std::sqrt(2e-4) * (1 - 1e-6));
+  }
+}
+
+}  // namespace
+}  // namespace tfdude
