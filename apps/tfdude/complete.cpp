@@ -43,6 +43,7 @@ Completed kind_of(const CLI::App& command, const std::string& name) {
       {"--in", Completed::kFrames},
       {"PARTITION", Completed::kPartitions},
       {"--partition", Completed::kPartitions},
+      {"--to-owner", Completed::kPartitions},
       {"--into", Completed::kPartitions},
       {"FILE", Completed::kFiles},
       {"--out", Completed::kFiles},

@@ -74,6 +74,21 @@ void bind_writes(py::class_<Session, std::shared_ptr<Session>>& cls) {
       py::arg("id"), py::arg("parent"), py::arg("X_PC") = py::none(),
       "Moves a frame, with all below it, to a new parent. X_PC: None keeps its value.");
   cls.def(
+      "hand_over",
+      [](const Session& session, const std::string& id, const std::string& partition,
+         const std::optional<std::string>& parent, std::optional<Transform> X_PC) {
+        if (!parent && X_PC) throw py::value_error("X_PC needs a new parent");
+        const PartialTransform parts = X_PC ? PartialTransform(*X_PC) : PartialTransform();
+        check(session.call([&](Client& c) {
+          return parent ? c.hand_over(id, partition, *parent, parts) : c.hand_over(id, partition);
+        }));
+      },
+      py::arg("id"), py::arg("partition"), py::arg("parent") = py::none(),
+      py::arg("X_PC") = py::none(),
+      "Makes another partition the owner of a frame and of all below it that its owner has, with\n"
+      "their histories and correlations. Readers find it all the time.\n\n"
+      "parent: also moves it below that frame, in the same step; X_PC is as of move().");
+  cls.def(
       "update",
       [](const Session& session, const std::string& id, const Transform& X_PC, py::handle stamp) {
         const std::optional<Time> time = to_stamp(stamp, "stamp");

@@ -39,6 +39,7 @@ void Call::known(Result<bool> fresh) {
 
 void Call::plan(const Directory& directory, std::uint64_t version, bool certain,
                 Clock::time_point now) {
+  changed_ = attempts_ > 0 && (changed_ || version != version_);
   version_ = version;
   auto planned = task_.plan(directory, now);
   if (planned) return ask();
@@ -133,7 +134,7 @@ void Call::judge(Clock::time_point now) {
       attempts_ = 0;
       pause_ = kFirstPause;
       max_age_ = task_.max_age();
-      return pause(now + task_.pause(), {});
+      return pause(std::min(now + task_.pause(), limit_.at()), {});
   }
 }
 
@@ -141,6 +142,7 @@ void Call::retry(Error error, Clock::time_point now) {
   if (!task_.may_plan_again()) return fail(std::move(error));
   const bool denies = denies_plan(error.code);
   const bool in_time = !limit_.over(now + pause_);
+  const int most = changed_ ? kAttemptsInChange : kAttempts;
   if (asks_) {
     const bool outdated = error.code == Errc::kNotOwner && pause_ <= kStructureDelay;
     if (!(outdated || denies) || !in_time) return fail(std::move(error));
@@ -148,7 +150,7 @@ void Call::retry(Error error, Clock::time_point now) {
       state_ = State::kKnow;
       return;
     }
-  } else if (error.code == Errc::kNotOwner && ++attempts_ < kAttempts && !limit_.over(now)) {
+  } else if (error.code == Errc::kNotOwner && ++attempts_ < most && !limit_.over(now)) {
     return pause(std::min(now + kStructureDelay, limit_.at()), version_);
   } else if (!denies || !in_time) {
     return fail(std::move(error));

@@ -65,6 +65,9 @@ class Call {
 
   /// How often to ask a partition that may no longer be the owner.
   static constexpr int kAttempts = 3;
+  /// The same if the structure has changed meanwhile: a handover changes it three times, and after
+  /// each change that partition is asked again.
+  static constexpr int kAttemptsInChange = 6;
   /// How long a structure change may take to arrive if a reply says that the known structure is
   /// outdated.
   static constexpr Milliseconds kStructureDelay{100};
@@ -167,6 +170,7 @@ class Call {
   std::vector<std::string> late_;
   bool outdates_ = false;
   int attempts_ = 0;
+  bool changed_ = false;  // the structure, since the first of them
   Milliseconds pause_;
   Clock::time_point until_{};
   std::optional<std::uint64_t> awaits_;

@@ -213,6 +213,15 @@ Result<void> Client::move(const std::string& id, const std::string& parent,
   return participant_->writes().move(id, {parent, X_PC});
 }
 
+Result<void> Client::hand_over(const std::string& id, const std::string& partition) {
+  return participant_->writes().hand_over(id, partition, std::nullopt, {});
+}
+
+Result<void> Client::hand_over(const std::string& id, const std::string& partition,
+                               const std::string& parent, const PartialTransform& X_PC) {
+  return participant_->writes().hand_over(id, partition, parent, X_PC);
+}
+
 Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
   return participant_->lookups().lookup(a, b);
 }

@@ -329,7 +329,10 @@ void Directory::saw_lamport_time(std::uint64_t time) {
 std::uint64_t Directory::next_lamport_time(Time now) {
   const auto nanoseconds = now.time_since_epoch().count();
   const auto clock = nanoseconds > 0 ? static_cast<std::uint64_t>(nanoseconds) : 0;
-  latest_lamport_time_ = std::max(clock, next_counter(latest_lamport_time_));
+  const auto on_grid = [](std::uint64_t time) { return time - time % kLamportGrid; };
+  latest_lamport_time_ =
+      std::max(on_grid(clock + kLamportGrid - 1),
+               on_grid(std::min(latest_lamport_time_, kLastCounter - kLamportGrid)) + kLamportGrid);
   return latest_lamport_time_;
 }
 

@@ -132,8 +132,13 @@ class Directory {
   [[nodiscard]] bool make_way(const std::string& parent) { return claims_.make_way(parent); }
 
   /// As FrameClaims::take() and FrameClaims::holder().
-  [[nodiscard]] bool take(const std::string& id) { return claims_.take(id); }
+  [[nodiscard]] bool take(const std::string& id, std::optional<std::uint64_t> lamport_time = {}) {
+    return claims_.take(id, lamport_time);
+  }
   [[nodiscard]] Owner holder(const std::string& id) const { return claims_.holder(id); }
+
+  /// Claims to frames that are handed over.
+  [[nodiscard]] FrameClaims& handovers() { return claims_; }
 
   /// What this process's partition would have to yield, according to what was applied so far.
   /// O(contested frames).
@@ -151,7 +156,8 @@ class Directory {
 
   /// The Lamport time of a structure change: the time [ns since the UNIX epoch], but greater than
   /// all given or seen before (Lamport 1978, rules IR1 and IR2). So a change made with knowledge of
-  /// another one has the greater time.
+  /// another one has the greater time. It is a multiple of kLamportGrid: only those of claims in a
+  /// handover lie between.
   [[nodiscard]] std::uint64_t next_lamport_time(Time now);
 
   /// Records a Lamport time given by an earlier process of this partition, or known to a sender:
@@ -173,6 +179,13 @@ class Directory {
 
   /// The epoch up to which this partition's structure is known here.
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
+
+  /// Whether what is known of the frames of a partition is of its process that lives.
+  [[nodiscard]] bool is_of_live_process(Owner owner) const {
+    const Known& partition = partitions_[owner];
+    return partition.info.reachable && partition.incarnation == partition.live &&
+           !partition.successor;
+  }
 
   /// Whether all pages of all reachable partitions have come.
   [[nodiscard]] bool complete() const { return incomplete() == nullptr; }

@@ -42,7 +42,7 @@ FrameClaim FrameClaims::in_force(const FrameInfo& there) const {
   return {there.owner, there.parent, there.lamport_time, page_of(there.id)};
 }
 
-FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) {
+const FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) const {
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end()) return nullptr;
   const auto mine = std::find_if(claims->second.begin(), claims->second.end(),
@@ -50,7 +50,7 @@ FrameClaim* FrameClaims::shadowed(const std::string& id, Owner owner) {
   return mine != claims->second.end() ? &*mine : nullptr;
 }
 
-std::optional<FrameClaim> FrameClaims::claim_of(const std::string& id, Owner owner) {
+std::optional<FrameClaim> FrameClaims::claim_of(const std::string& id, Owner owner) const {
   if (const FrameClaim* mine = shadowed(id, owner)) return *mine;
   const auto there = forest_.info(id);
   return there && there->owner == owner ? std::optional(in_force(*there)) : std::nullopt;
@@ -65,7 +65,9 @@ bool FrameClaims::is_ended(const std::string& id, const FrameClaim& claim) const
 
 const FrameClaim* FrameClaims::winning_claim(const std::string& id, Claims claims) const {
   claims.erase(std::remove_if(claims.begin(), claims.end(),
-                              [&](const FrameClaim* claim) { return is_ended(id, *claim); }),
+                              [&](const FrameClaim* claim) {
+                                return claim->passed_on || is_ended(id, *claim);
+                              }),
                claims.end());
   return claims.empty() ? nullptr : &succession_.winning_claim(claims);
 }
@@ -73,6 +75,8 @@ const FrameClaim* FrameClaims::winning_claim(const std::string& id, Claims claim
 bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) {
   const auto there = forest_.info(id);
   const auto before = claim_of(id, claim.owner);
+  const bool repeats = before && before->lamport_time == claim.lamport_time;
+  claim.passed_on = repeats && before->passed_on;
   // A late page: the frame has left it since.
   const bool late =
       before && before->page != claim.page && before->lamport_time > claim.lamport_time;
@@ -87,12 +91,13 @@ bool FrameClaims::claim(const std::string& id, FrameClaim claim, Counts counts) 
     shadow(id, in_force(*there));
   }
   shadow(id, std::move(claim));
+  note_passed_on(id);
   promote(id);
   return !before;
 }
 
 bool FrameClaims::unclaim(const std::string& id, Owner owner, std::uint32_t page) {
-  if (FrameClaim* mine = shadowed(id, owner)) {
+  if (const FrameClaim* mine = shadowed(id, owner)) {
     if (mine->page != page) return false;
     auto& others = shadowed_[id];
     others.erase(others.begin() + (mine - others.data()));
@@ -135,23 +140,34 @@ bool FrameClaims::may_take_from(Owner owner) const {
          succession_.reported_survivor(kHeldHere, owner);
 }
 
-Owner FrameClaims::holder(const std::string& id) const {
+// A handover that an earlier process of this partition has begun, ended by keeping the frame, or
+// taken part in as the new owner.
+bool FrameClaims::goes_on(std::uint64_t own, Owner owner, std::uint64_t theirs) const {
+  if (is_passed_on(own, theirs)) return true;
+  const bool open = is_adopted(own, theirs) || is_kept(own, theirs) || is_adopted(theirs, own);
+  return open && !succession_.reported_survivor(owner, kHeldHere);
+}
+
+Owner FrameClaims::holder(const std::string& id, std::optional<std::uint64_t> lamport_time) const {
   const auto there = forest_.info(id);
   if (!there) return kHeldHere;
-  if (!may_take_from(there->owner)) return there->owner;
+  const auto stays = [&](Owner owner, std::uint64_t theirs) {
+    return !may_take_from(owner) && !(lamport_time && goes_on(*lamport_time, owner, theirs));
+  };
+  if (stays(there->owner, in_force(*there).lamport_time)) return there->owner;
   const auto claims = shadowed_.find(id);
   if (claims == shadowed_.end()) return kHeldHere;
   const auto other =
       std::find_if(claims->second.begin(), claims->second.end(),
-                   [this](const FrameClaim& claim) { return !may_take_from(claim.owner); });
+                   [&](const FrameClaim& claim) { return stays(claim.owner, claim.lamport_time); });
   return other != claims->second.end() ? other->owner : kHeldHere;
 }
 
-bool FrameClaims::take(const std::string& id) {
+bool FrameClaims::take(const std::string& id, std::optional<std::uint64_t> lamport_time) {
   const auto there = forest_.info(id);
   if (removals_.any(id)) doubted_.insert(id);
   if (!there || there->owner == kHeldHere) return true;
-  if (holder(id) != kHeldHere) return false;
+  if (holder(id, lamport_time) != kHeldHere) return false;
   FrameClaim theirs = in_force(*there);
   forest_.drop_remote(id, theirs.owner);
   cut_.erase(id);

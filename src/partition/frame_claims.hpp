@@ -23,7 +23,40 @@ struct FrameClaim {
   std::string parent;
   std::uint64_t lamport_time = 0;
   std::uint32_t page = 0;  ///< the owner's page that contains the claim
+  bool passed_on = false;  ///< the owner has handed the frame over: it is in force no more
 };
+
+/// Lamport times of all changes are multiples of it (Directory::next_lamport_time). Those between
+/// say what part a claim has in a handover.
+inline constexpr std::uint64_t kLamportGrid = 16;
+
+// How the Lamport times of claims to a frame that is handed over differ from that of the offer, by
+// its owner (FrameClaims).
+inline constexpr std::uint64_t kAdopted = 1;   ///< the new owner claims it so much later
+inline constexpr std::uint64_t kPassedOn = 4;  ///< the former owner lets go
+inline constexpr std::uint64_t kKept = 1;      ///< the former owner keeps it: so much earlier
+
+/// Whether the claim offers the frame.
+[[nodiscard]] inline bool is_offer(std::uint64_t claim) {
+  return claim % kLamportGrid == kLamportGrid / 2;
+}
+/// Whether its owner offers the frame to the one with the other claim, and that one has adopted it.
+[[nodiscard]] inline bool is_adopted(std::uint64_t offer, std::uint64_t claim) {
+  return is_offer(offer) && offer + kAdopted == claim;
+}
+/// Whether the owner with the first claim has kept the frame, which the other one has adopted.
+[[nodiscard]] inline bool is_kept(std::uint64_t kept, std::uint64_t claim) {
+  return is_adopted(kept + kKept, claim);
+}
+/// Whether the owner that has handed it over only repeats its claim.
+[[nodiscard]] inline bool is_passed_on(std::uint64_t to, std::uint64_t from) {
+  return is_adopted(to - kAdopted, to) && to - kAdopted + kPassedOn == from;
+}
+
+/// The time of an offer to a partition, a little after a multiple of the grid: it says to which
+/// one, so that no other one can adopt the frame. Of 65,536 names, two are taken for the same.
+[[nodiscard]] std::uint64_t time_of_offer(std::uint64_t earliest, const std::string& to);
+[[nodiscard]] bool is_offered_to(std::uint64_t offer, const std::string& partition);
 
 /// A frame that this process's partition would have to yield, or move, because of claims of others.
 /// Messages on their way may resolve it, for example a claim that was withdrawn. So it is done only
@@ -84,7 +117,7 @@ class FrameClaims {
   bool unclaim(const std::string& id, Owner owner, std::uint32_t page);
 
   /// The partition's claim to the frame, whether it is in force or not. O(1).
-  [[nodiscard]] std::optional<FrameClaim> claim_of(const std::string& id, Owner owner);
+  [[nodiscard]] std::optional<FrameClaim> claim_of(const std::string& id, Owner owner) const;
 
   /// A partition has removed or dropped a frame. O(1).
   void removed(const std::string& id, const FrameRemoval& removal);
@@ -95,11 +128,51 @@ class FrameClaims {
   void released(const std::string& id);
 
   /// Prepares for holding a frame that may belong to another partition. A new partition yields to
-  /// those present, whichever claim is older, unless it has survived them.
+  /// those present, whichever claim is older, unless it has survived them, or an earlier process of
+  /// it and the other one were handing the frame over.
+  /// @param lamport_time  of the claim; absent: a new one
   /// @return false if it has to yield
-  [[nodiscard]] bool take(const std::string& id);
+  [[nodiscard]] bool take(const std::string& id, std::optional<std::uint64_t> lamport_time = {});
   /// The partition to which it has to yield.
-  [[nodiscard]] Owner holder(const std::string& id) const;
+  [[nodiscard]] Owner holder(const std::string& id,
+                             std::optional<std::uint64_t> lamport_time = {}) const;
+
+  // Handing over (frame_handovers.cpp). The owner offers the frame: it claims it again, at L. The
+  // new owner claims it at L + 1, so that its claim is the younger one, which nobody prefers. Then
+  // the former owner lets go, and claims it at L + 4 for a while: whoever knows both claims knows
+  // by that who the owner is. Or it keeps the frame, and claims it at L - 1.
+
+  /// The claim to a frame that is in force.
+  [[nodiscard]] std::optional<FrameClaim> claim_in_force(const std::string& id) const;
+  /// This process holds frames now, of which these claims were in force.
+  void adopted(const std::vector<std::pair<std::string, FrameClaim>>& before);
+  /// Whether that partition has adopted a frame that this process holds and offers.
+  [[nodiscard]] bool has_adopted(Owner owner, const std::string& id) const;
+  /// Whether others claim the frame, too, and may have to yield.
+  [[nodiscard]] bool is_contested(const std::string& id) const;
+  /// This process lets go of frames that that partition has adopted.
+  void pass_on(Owner owner, const std::vector<std::string>& ids);
+  /// Whether this partition has got the held frame, or has kept it, and the other one still claims
+  /// it, too. Until then the frame's Lamport time must stay, even if the frame is moved: the other
+  /// claim would be the older one.
+  [[nodiscard]] bool is_just_handed(const std::string& id) const;
+  /// The partition that offers a held frame to this one, according to their claims alone.
+  [[nodiscard]] std::optional<Owner> offered_by(const std::string& id) const;
+  /// Whether that partition has kept a frame that this one has adopted at this time.
+  [[nodiscard]] bool has_kept(Owner owner, const std::string& id, std::uint64_t adopted) const {
+    const auto theirs = claim_of(id, owner);
+    return theirs && is_kept(theirs->lamport_time, adopted);
+  }
+  /// Whether a partition does not count any more.
+  [[nodiscard]] bool is_gone(Owner owner) const { return succession_.is_gone(owner); }
+  /// Whether the claims of the second do not count against those of the first.
+  [[nodiscard]] bool reported_survivor(Owner first, Owner second) const {
+    return succession_.reported_survivor(first, second);
+  }
+  /// Whether a partition has removed, released or yielded the frame, later than that.
+  [[nodiscard]] bool has_removed(Owner owner, const std::string& id, std::uint64_t since) const;
+  /// Whether another partition claims the held frame, later than that.
+  [[nodiscard]] bool is_claimed_since(const std::string& id, std::uint64_t since) const;
 
   /// This process is going to place a frame below itself. Cuts the path from `parent` up to the
   /// frame, at the youngest claim of others; mend() then finds out who has to yield.
@@ -138,12 +211,14 @@ class FrameClaims {
     return succession_.standing(owner) == Succession::Standing::kThere;
   }
   [[nodiscard]] bool may_take_from(Owner owner) const;
+  [[nodiscard]] bool goes_on(std::uint64_t own, Owner owner, std::uint64_t theirs) const;
+  [[nodiscard]] const FrameClaim* shadowed(const std::string& id, Owner owner) const;
   /// Of two edges in a cycle: whether the first one is to be cut rather than the second.
   [[nodiscard]] bool yields_to(const FrameInfo& a, const FrameInfo& b) const;
   [[nodiscard]] FrameClaim in_force(const FrameInfo& there) const;
-  [[nodiscard]] FrameClaim* shadowed(const std::string& id, Owner owner);
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
   void shadow(const std::string& id, FrameClaim claim);
+  void note_passed_on(const std::string& id);
   void promote(const std::string& id);
   void reconsider();
   void reconsider(const std::string& id);

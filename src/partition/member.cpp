@@ -18,12 +18,13 @@ void Member::look_for_contests() {
 
 void Member::on_page(const Page& page) {
   directory_.apply(page);
+  to_settle_ = true;
   outcome_.heard = true;
   look_for_contests();
 }
 
 void Member::on_presence(const Presence& presence, Time now) {
-  outcome_.heard = true;
+  outcome_.heard = to_settle_ = true;
   if (presence.partition == name_) {
     on_own_presence(presence);
     overtake(now);
@@ -53,7 +54,7 @@ void Member::on_own_presence(const Presence& presence) {
 
 void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Time now,
                      std::chrono::nanoseconds early) {
-  outcome_.heard = true;
+  outcome_.heard = to_settle_ = true;
   if (partition == name_) {
     claim_.lost(incarnation);
     overtake(now);
@@ -65,6 +66,12 @@ void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Ti
 }
 
 void Member::on_time(Steady now) {
+  to_settle_ = true;
+  const bool owns = partition_ != nullptr && given_up_.empty();
+  if (owns && partition_->on_time(now)) {
+    outcome_.to_commit = true;
+    look_for_contests();
+  }
   const bool gone = directory_.look_for_gone(now);
   outcome_.look_for_gone = directory_.any_pending();
   if (!gone) return;
@@ -221,6 +228,13 @@ Ready Member::take_ready(bool values_due) {
 
 std::optional<Presence> Member::stored(const Ready& ready) {
   if (!ready.refused) told_epoch_ = ready.rows.epoch;
+  // Before others hear of it, and may change what they have got.
+  if (!ready.refused && partition_ != nullptr && given_up_.empty()) {
+    if (partition_->pass_on_stored(ready.rows.epoch)) {
+      outcome_.to_commit = true;
+      look_for_contests();
+    }
+  }
   // A partition that was given up meanwhile is not announced as served again.
   const bool stands = ready.presence && given_up_.empty();
   if (stands) {
@@ -251,6 +265,13 @@ void Member::compare_plans() {
 }
 
 Outcome Member::take_outcome() {
+  if (partition_ != nullptr && given_up_.empty()) {
+    const bool settles = std::exchange(to_settle_, false);
+    // A yield may have waited for its end.
+    if (settles && partition_->hands_over()) look_for_contests();
+    if (settles && partition_->settle_handovers()) outcome_.to_commit = true;
+    if (partition_->awaits_time()) outcome_.look_for_gone = true;
+  }
   // A frame that was yielded or removed here may have been the last one that was contested.
   if (directory_.resolve_returns() && partition_ != nullptr) outcome_.to_commit = true;
   compare_plans();

@@ -133,6 +133,7 @@ class Member {
   std::pair<std::uint64_t, std::uint64_t> planned_with_{};  // versions at the last outcome
   std::uint64_t told_epoch_ = 0;                            // of the published structure
   std::map<std::pair<PeerId, std::uint32_t>, PendingReply> replies_;
+  bool to_settle_ = false;  // a handover may go on
   Outcome outcome_;
 };
 

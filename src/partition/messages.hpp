@@ -15,6 +15,7 @@
 #include "tfdude/types/joint_spec.hpp"
 #include "tfdude/types/version.hpp"
 
+#include "partition/handover_messages.hpp"
 #include "tree/forest.hpp"
 
 // The messages between participants, independent of any transport. idl/tfdude.idl defines their
@@ -205,7 +206,8 @@ struct Request {
   std::variant<AddRequest, RemoveRequest, UpdateRequest, MoveRequest, LookupRequest, WatchRequest,
                HistoryRequest, ReviseRequest, ConsistencyRequest, JointUpdate, JointsRequest,
                PartialUpdateRequest, CorrelateRequest, ForgetRequest, FramesRequest,
-               DescriptionRequest, MemoryRequest, TimeRequest, RewriteRequest>
+               DescriptionRequest, MemoryRequest, TimeRequest, RewriteRequest, HandOverRequest,
+               AdoptRequest>
       body;
   /// The sender awaits no replies of this partition to requests with lower numbers, in whatever
   /// order they come. Not greater than the full number of this request, of which `sequence` has the
@@ -264,7 +266,7 @@ struct Reply {
   /// Done, the error, or the requested data.
   std::variant<Done, Error, SegmentValues, PushedValues, std::vector<HistoryInfo>,
                std::vector<EdgeConsistency>, std::vector<JointInfo>, std::vector<KnownFrame>,
-               DescriptionPart, MemoryOffer>
+               DescriptionPart, MemoryOffer, HandedPart>
       body;
   /// For a change: the latest time known to the owner, for the next change of the requester.
   LamportTime lamport_time = 0;

@@ -63,6 +63,7 @@ class Pages {
 
   /// Sets the joint that moves a frame; the frame must have been put.
   void put_joint(const std::string& id, const PageJoint& joint);
+  [[nodiscard]] bool has_joint(const std::string& id) const { return joints_.count(id) != 0; }
   /// @return the previous joint
   std::optional<PageJoint> erase_joint(const std::string& id);
 

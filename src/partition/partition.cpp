@@ -97,7 +97,7 @@ void Partition::detach_joint(const std::string& id) {
 }
 
 Reply Partition::answer(const PeerId& peer, const Request& request, Time now) {
-  if (is_read_only(request)) return answer(request, now);
+  if (is_read_only(request)) return answer_new(peer, request, now);
   if (auto before = replies_.find(peer, request, now)) return *std::move(before);
   Reply reply = answer_new(peer, request, now);
   replies_.put(peer, request, reply);
@@ -118,9 +118,12 @@ Reply Partition::answer(const Request& request, Time now) {
 
 Reply Partition::answer_new(const PeerId& peer, const Request& request, Time now) {
   rewrites_.forget_idle(now);
+  adopted_parts_.forget_idle(now);
   if (const auto* lookup = std::get_if<LookupRequest>(&request.body)) {
     return answer_lookup(request.sequence, *lookup);
   }
+  const auto* handover = std::get_if<HandOverRequest>(&request.body);
+  if (handover != nullptr) return answer_handover(peer, request, *handover, now);
   Reply reply;
   reply.sequence = request.sequence;
   if (const auto* asked = std::get_if<ConsistencyRequest>(&request.body)) {
@@ -191,6 +194,7 @@ Result<void> Partition::apply(const PeerId& peer, const Request& request, Time n
           [&](const MoveRequest& one) { return move(request.id, one, now); },
           [&](const ReviseRequest& one) { return revise(one); },
           [&](const RewriteRequest& one) { return rewrite(peer, request.id, one, now); },
+          [&](const AdoptRequest& one) { return adopt(peer, request.id, one, now); },
           [&](const JointUpdate& one) { return set_joints(one); },
           [&](const CorrelateRequest& one) { return correlate(request.id, one.correlation); },
           [&](const ForgetRequest& one) { return forget_partition(one, now); },
@@ -233,7 +237,7 @@ Result<void> Partition::remove(const RemoveRequest& request, Time now) {
 
 Result<void> Partition::move(const std::string& id, const MoveRequest& request, Time now) {
   directory_.saw_lamport_time(request.lamport_time);
-  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  const std::uint64_t lamport_time = time_of_move(id, now);
   if (auto moved = forest_.move(id, request.parent, request.X_PC, lamport_time); !moved) {
     return tl::unexpected(at_home(std::move(moved.error()), id));
   }
@@ -247,6 +251,7 @@ Result<void> Partition::move(const std::string& id, const MoveRequest& request, 
 }
 
 void Partition::put(const std::string& id, const std::string& parent, std::uint64_t lamport_time) {
+  handovers_.passed.erase(id);
   pages_.put(id, parent, lamport_time);
   directory_.forget_own_tombstone(id);
   directory_.changes().frame_added(id, parent, name_);
@@ -382,7 +387,9 @@ std::size_t Partition::apply(const Update& update) {
   if (taken.error().code != Errc::kUnknownFrame && taken.error().code != Errc::kNotOwner) return 0;
   std::vector<EdgeUpdate> own;
   std::copy_if(update.edges.begin(), update.edges.end(), std::back_inserter(own),
-               [this](const EdgeUpdate& edge) { return forest_.holds(edge.id); });
+               [this](const EdgeUpdate& edge) {
+                 return forest_.holds(edge.id) && !forest_.is_frozen(edge.id);
+               });
   return forest_.update(own, update.stamp) ? own.size() : 0;
 }
 
@@ -390,6 +397,7 @@ std::size_t Partition::apply(const Update& update) {
 // route is outdated, and the directory will have a new one.
 Error Partition::at_home(Error error, std::string_view id) const {
   if (error.code != Errc::kUnknownFrame && error.code != Errc::kNotOwner) return error;
+  if (forest_.holds(id)) return error;  // it, or a frame below it, is being handed over
   return {Errc::kNotOwner,
           "partition " + quote(name_) + " does not own frame " + quote(id) + " (any more)"};
 }

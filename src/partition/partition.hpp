@@ -12,6 +12,7 @@
 
 #include "partition/consistency.hpp"
 #include "partition/directory.hpp"
+#include "partition/handovers.hpp"
 #include "partition/joints.hpp"
 #include "partition/messages.hpp"
 #include "partition/pages.hpp"
@@ -89,14 +90,24 @@ class Partition {
   [[nodiscard]] Result<void> release(const std::vector<std::string>& ids, Time now);
 
   /// What would have to be yielded according to the directory's current state. O(contested frames).
-  [[nodiscard]] std::set<PendingYield> pending_yields() const {
-    return directory_.pending_yields();
-  }
+  [[nodiscard]] std::set<PendingYield> pending_yields() const;
 
   /// Yields those of `due` that still have to be yielded; messages that were on their way may have
   /// resolved the others.
   /// @return whether the structure changed; new yields may then be pending
   bool yield(const std::set<PendingYield>& due, Time now);
+
+  /// Goes on with handovers, according to what is known of the claims of others. Call after each
+  /// input. @return whether the structure changed
+  bool settle_handovers();
+  /// Ends those that have lasted too long. Call as long as handovers await the time, at least twice
+  /// per second. @return whether the structure changed
+  bool on_time(Handovers::Steady now);
+  [[nodiscard]] bool awaits_time() const { return handovers_.awaits_time(); }
+  [[nodiscard]] bool hands_over() const { return !handovers_.empty(); }
+  /// What was handed over up to that epoch is stored, and not yet published: others have it now.
+  /// @return whether the structure changed
+  bool pass_on_stored(std::uint64_t stored);
 
   /// Continues as a later incarnation, since others know one that hides this one.
   void overtake(std::uint64_t incarnation) {
@@ -108,7 +119,9 @@ class Partition {
   /// The pages to publish since the last call.
   [[nodiscard]] std::vector<Page> take_pages() { return pages_.take_changed(); }
   [[nodiscard]] std::uint32_t page_count() const { return pages_.count(); }
-  [[nodiscard]] std::size_t frame_count() const { return pages_.frame_count(); }
+  [[nodiscard]] std::size_t frame_count() const {
+    return pages_.frame_count() - handovers_.passed.size();
+  }
   /// As Pages::epoch().
   [[nodiscard]] std::uint64_t epoch() const { return pages_.epoch(); }
   /// The number of replies kept for requests that may be repeated.
@@ -121,9 +134,7 @@ class Partition {
 
   /// Adds the values, as of when the change was taken. Needs no lock: there may be many. See
   /// Forest::changed().
-  void add_values(StateChange& change) const {
-    if (change.commits.last > change.commits.after) change.values = forest_.changed(change.commits);
-  }
+  void add_values(StateChange& change) const;
 
   /// The change could not be saved, and these pages were not published: both are returned again
   /// later.
@@ -146,6 +157,44 @@ class Partition {
   [[nodiscard]] Result<void> revise(const ReviseRequest& request);
   [[nodiscard]] Result<void> rewrite(const PeerId& peer, const std::string& id,
                                      const RewriteRequest& part, Time now);
+  [[nodiscard]] Reply answer_handover(const PeerId& peer, const Request& request,
+                                      const HandOverRequest& asked, Time now);
+  [[nodiscard]] Result<void> begin_handover(const PeerId& peer, const std::string& top,
+                                            const std::string& to, Time now);
+  void offer(const std::string& to, std::vector<HandedFrame>& frames, Time now);
+  [[nodiscard]] Result<std::vector<HandedFrame>> frames_to_hand_over(const std::string& top) const;
+  [[nodiscard]] Result<HandedPart> part_of(const Handovers::Handover& handover,
+                                           const HandOverRequest& asked) const;
+  [[nodiscard]] Result<void> hand_over(const PeerId& peer, const std::string& top,
+                                       const HandOverRequest& asked);
+  [[nodiscard]] Result<void> adopt(const PeerId& peer, const std::string& top,
+                                   const AdoptRequest& request, Time now);
+  [[nodiscard]] Result<void> check_adopted(const std::vector<HandedEdge>& edges,
+                                           const std::string& top,
+                                           const AdoptRequest& request) const;
+  [[nodiscard]] Result<void> check_offered(const std::vector<HandedEdge>& edges,
+                                           const std::string& top,
+                                           const AdoptRequest& request) const;
+  [[nodiscard]] tl::unexpected<Error> fail_not_offered(const std::string& id,
+                                                       const std::string& from) const;
+  /// Of a claim to a held frame with another parent.
+  [[nodiscard]] std::uint64_t time_of_move(const std::string& id, Time now);
+  /// Gives up a frame that no joint moves.
+  bool withdraw(const std::string& id);
+  void resume_handovers(const std::vector<const StoredFrame*>& kept);
+  void freeze_adopted();
+  /// Of an adopted frame: its former owner has not decided, or this partition owns it, or does not.
+  enum class Outlook : std::uint8_t { kOpen, kOwned, kLost };
+  [[nodiscard]] Outlook outlook(const std::string& id, const Handovers::Adopted& adopted) const;
+  bool settle_offered();
+  bool settle_adopted();
+  bool settle_passed();
+  [[nodiscard]] bool stands(const Handovers::Handover& handover) const;
+  [[nodiscard]] bool must_wait(const PendingYield& pending) const;
+  [[nodiscard]] bool is_taken(const Handovers::Handover& handover) const;
+  void decide(Handovers::Handover& handover);
+  void pass_on(const Handovers::Handover& handover);
+  void keep(const Handovers::Handover& handover);
   [[nodiscard]] Result<void> correlate(const std::string& id, const Correlation& correlation);
   [[nodiscard]] Result<void> set_joints(const JointUpdate& update);
   [[nodiscard]] Result<void> take(const std::vector<FrameSpec>& frames, std::uint64_t lamport_time);
@@ -176,6 +225,8 @@ class Partition {
   Joints joints_;
   ReplyCache replies_;
   Rewrites rewrites_;
+  Handovers handovers_;
+  AdoptedParts adopted_parts_;
   std::size_t max_frames_ = SIZE_MAX;
   std::uint64_t refused_frames_ = 0;
   Consistency consistency_;

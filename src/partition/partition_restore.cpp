@@ -101,7 +101,7 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   std::vector<const StoredFrame*> kept;
   std::vector<const StoredFrame*> contested;
   for (const StoredFrame& frame : frames) {
-    (directory_.take(frame.id) ? kept : contested).push_back(&frame);
+    (directory_.take(frame.id, frame.lamport_time) ? kept : contested).push_back(&frame);
   }
   std::vector<const StoredFrame*> circular;
   for (const StoredFrame* frame : kept) {
@@ -114,15 +114,22 @@ Result<void> Partition::restore(const StoredState& state, const std::vector<Fram
   if (!configured.empty()) configured_ = configured;
   pages_.watch_ids();
   for (const StoredFrame* frame : contested) {
-    yield_to(frame->id, directory_.holder(frame->id), now);
+    const Owner holder = directory_.holder(frame->id);
+    if (directory_.handovers().has_kept(holder, frame->id, frame->lamport_time)) {
+      unsaved_.insert(frame->id);
+    } else {
+      yield_to(frame->id, holder, now);
+    }
   }
   for (const StoredFrame* frame : circular) make_root(*frame, now);
+  resume_handovers(kept);
   directory_.moved();
   directory_.find_orphans();
   for (const PendingYield& one : directory_.removed_before()) yield(one, now);
   while (yield(pending_yields(), now)) {
   }
   auto taken = reconfigure(state, joints, configured, now);
+  freeze_adopted();
   if (taken) attach_joints(configured, joints);
   // Without a configuration it is not known what they are.
   if (!configured.empty()) joints_.erase_unused(state.joints);
@@ -168,6 +175,8 @@ Result<void> Partition::reconfigure(const StoredState& state,
       case Kind::kReplace:
         // Another partition has it by now: it was yielded, and that was told.
         if (const auto there = forest_.info(id); there && there->owner != kHeldHere) break;
+        // As the one that has not decided yet whether it keeps it knows it.
+        if (handovers_.adopted.count(id) != 0) break;
         [[fallthrough]];
       case Kind::kAdd:
         fresh.push_back(as_left(*entries.at(id), joints));
@@ -209,7 +218,8 @@ Result<void> Partition::release(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
     const auto there = forest_.info(id);
     if (!there) return fail_about_frame(Errc::kUnknownFrame, "no frame " + quote(id), id);
-    if (there->owner == kHeldHere) continue;
+    if (there->owner == kHeldHere && !forest_.is_frozen(id)) continue;
+    if (there->owner == kHeldHere) return being_handed_over(id);
     return fail(Errc::kNotOwner, "frame " + quote(id) + " belongs to partition " +
                                      quote(directory_.name(there->owner)) + ", not to " +
                                      quote(name_));
@@ -231,7 +241,7 @@ bool Partition::yield(const std::set<PendingYield>& due, Time now) {
   bool changed = false;
   // A release or removal may open a cycle, but not vice versa.
   for (const Kind kind : {Kind::kRelease, Kind::kRemove, Kind::kConcede, Kind::kUnhang}) {
-    for (const PendingYield& one : directory_.pending_yields()) {
+    for (const PendingYield& one : pending_yields()) {
       if (one.kind == kind && due.count(one) != 0) changed = yield(one, now) || changed;
     }
   }
@@ -294,7 +304,7 @@ Result<void> Partition::forget_partition(const ForgetRequest& request, Time now)
 }
 
 void Partition::make_root(const std::string& id, Owner rival, Time now) {
-  const std::uint64_t lamport_time = directory_.next_lamport_time(now);
+  const std::uint64_t lamport_time = time_of_move(id, now);
   if (!forest_.move(id, {}, {}, lamport_time)) return;
   detach_joint(id);
   pages_.put(id, {}, lamport_time);
@@ -319,7 +329,7 @@ StateChange Partition::take_unsaved(bool values_due) {
     if (auto tombstone = pages_.tombstone(id)) change.tombstones.push_back(*std::move(tombstone));
     const auto place = pages_.place(id);
     auto edge = forest_.kept(id);
-    if (!place || !edge) continue;
+    if (!place || !edge || handovers_.leaving.count(id) != 0) continue;
     change.frames.push_back({id, place->parent, edge->X_PC, place->lamport_time,
                              std::move(edge->correlation), edge->time});
   }
@@ -339,6 +349,19 @@ StateChange Partition::take_unsaved(bool values_due) {
   // After the frames, whose values may be older.
   change.commits.last = saved_commit_ = forest_.newest_commit();
   return change;
+}
+
+// Frames that are let go with this change are still held, and not stored any more.
+void Partition::add_values(StateChange& change) const {
+  if (change.commits.last <= change.commits.after) return;
+  change.values = forest_.changed(change.commits);
+  std::set<std::string_view> gone(change.erased.begin(), change.erased.end());
+  for (const StoredFrame& frame : change.frames) gone.erase(frame.id);
+  if (gone.empty()) return;
+  auto& values = change.values;
+  values.erase(std::remove_if(values.begin(), values.end(),
+                              [&](const ChangedEdge& edge) { return gone.count(edge.id) != 0; }),
+               values.end());
 }
 
 void Partition::still_unsaved(const StateChange& change, const std::vector<Page>& pages) {

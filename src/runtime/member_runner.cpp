@@ -300,10 +300,17 @@ Ready MemberRunner::take(bool values_due) {
 }
 
 void MemberRunner::publish(const Ready& ready) {
-  const auto said = with_rules([&](Member& member) { return member.stored(ready); });
+  std::optional<Presence> said;
+  Outcome outcome;
+  {
+    const Lock lock(structure_.mutex);
+    said = member_.stored(ready);
+    outcome = take_outcome();
+  }
   for (const Page& page : ready.pages) transport_.publish(page);
   if (said) announce(*said);
   structure_.changed.notify_all();
+  react(outcome);
 }
 
 void MemberRunner::take_back(const Ready& ready) {

@@ -136,7 +136,9 @@ Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
     // A frame removed by request has no edge to set.
     if (!declared || !structure_.forest.holds(frame.id)) continue;
     const EdgeTiming& timing = frame.timing ? *frame.timing : options_.history;
-    if (auto set = structure_.forest.set_timing(frame.id, timing); !set) return set;
+    auto set = structure_.forest.set_timing(frame.id, timing);
+    // One that is being handed over has that of its former owner.
+    if (!set && set.error().code != Errc::kNotOwner) return set;
   }
   return {};
 }

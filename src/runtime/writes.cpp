@@ -4,6 +4,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "calls/hand_over_task.hpp"
 #include "calls/rewrite_task.hpp"
 #include "partition/routing.hpp"
 
@@ -54,10 +55,24 @@ Result<void> Writes::remove(const std::string& id) {
 }
 
 Result<void> Writes::move(const std::string& id, const MoveRequest& request) {
-  return requests_.change(discovery_.call_deadline(), {id, request.parent},
-                          [&](const Directory& directory) {
-                            return route_move(structure_.forest, directory, id, request);
-                          });
+  return move(id, request, discovery_.call_deadline());
+}
+
+Result<void> Writes::move(const std::string& id, const MoveRequest& request,
+                          const Deadline& deadline) {
+  return requests_.change(deadline, {id, request.parent}, [&](const Directory& directory) {
+    return route_move(structure_.forest, directory, id, request);
+  });
+}
+
+Result<void> Writes::hand_over(const std::string& id, const std::string& partition,
+                               const std::optional<std::string>& parent,
+                               const PartialTransform& X_PC) {
+  const Deadline deadline = discovery_.call_deadline();
+  HandOverTask task(structure_.forest, id, partition, parent, X_PC, deadline.at());
+  auto done = requests_.run(task, deadline);
+  if (done || done.error().code != Errc::kAlreadyExists) return done;
+  return parent ? move(id, {*parent, X_PC}, deadline) : Result<void>();
 }
 
 template <class Edge>

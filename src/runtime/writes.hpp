@@ -27,6 +27,9 @@ class Writes {
                                  const std::string& partition);
   [[nodiscard]] Result<void> remove(const std::string& id);
   [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request);
+  [[nodiscard]] Result<void> hand_over(const std::string& id, const std::string& partition,
+                                       const std::optional<std::string>& parent,
+                                       const PartialTransform& X_PC);
   [[nodiscard]] Result<void> update(const std::vector<EdgeUpdate>& edges,
                                     std::optional<Time> stamp);
   [[nodiscard]] Result<void> update_partial(const std::vector<PartialUpdate>& edges,
@@ -44,6 +47,8 @@ class Writes {
   }
 
  private:
+  [[nodiscard]] Result<void> move(const std::string& id, const MoveRequest& request,
+                                  const Deadline& deadline);
   template <class Edge>
   [[nodiscard]] Result<void> ask_to_update(const std::vector<Edge>& edges,
                                            std::optional<Time> stamp);

@@ -20,6 +20,7 @@
 #include "tfdude/types/query.hpp"
 
 #include "math/joint_state.hpp"
+#include "tree/handed_edge.hpp"
 #include "tree/path_correlation.hpp"
 #include "tree/pushed_value.hpp"
 #include "tree/segments.hpp"
@@ -190,7 +191,8 @@ class Forest {
   /// sample. Does nothing if the edge is static.
   /// @return kUnknownFrame, kNotOwner.
   [[nodiscard]] Result<void> clear_history(std::string_view id);
-  /// Likewise for all held edges with samples at this time or later, as one commit. Also reads the
+  /// Likewise for all held edges with samples at this time or later, as one commit; for a frame
+  /// that is being handed over when that is over, unless another owner has it then. Also reads the
   /// clock again before the next stamp is judged. O(slots).
   /// @param jumped_from  where the clock has jumped back from: samples that were on their way then
   ///   are rejected, until it is there again
@@ -234,6 +236,32 @@ class Forest {
   [[nodiscard]] Result<void> move(std::string_view id, std::string_view parent,
                                   const PartialTransform& X_PC = {},
                                   std::uint64_t lamport_time = 0);
+
+  // --- handing over ---
+
+  /// Rejects changes of held frames with kNotOwner, until thaw(), which then clears the histories
+  /// that clear_histories() would have cleared. All can be read as before.
+  void freeze(const std::vector<std::string>& ids);
+  void thaw(const std::vector<std::string>& ids);
+  /// Likewise, and says when the frames got their parents.
+  void thaw(const std::vector<HandedFrame>& frames);
+  [[nodiscard]] bool is_frozen(std::string_view id) const;
+
+  /// What is known of a held edge, with its samples later than `after`, the oldest first.
+  /// @param most  how many of them
+  /// @return kUnknownFrame, kNotOwner.
+  [[nodiscard]] Result<HandedEdge> handed(std::string_view id, std::optional<Time> after,
+                                          std::size_t most) const;
+
+  /// Holds frames of others, parents before children, with all that was known of them, as one
+  /// commit; frozen. O(frames and samples).
+  /// @return kAlreadyExists (it is held here), kCycle, kInvalidInput (naming the frame and what is
+  ///   wrong). Nothing has changed then.
+  [[nodiscard]] Result<void> adopt(const std::vector<HandedEdge>& edges);
+
+  /// Another owner holds these held frames now, as one commit. A frame whose parent is below it
+  /// becomes a root.
+  void hand_to(Owner owner, const std::vector<HandedFrame>& frames);
 
   // --- frames held elsewhere: structure only ---
 

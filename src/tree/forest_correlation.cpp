@@ -102,7 +102,7 @@ Result<void> Forest::correlate(std::string_view id, const Correlation& correlati
     return fail_at("frame " + quote(id), ok.error());
   }
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   if (auto ok = impl_->check_room(impl_->frames_.newest_value(*slot), correlation); !ok) {
     return fail_at("frame " + quote(id), ok.error());

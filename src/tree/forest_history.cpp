@@ -8,7 +8,6 @@
 
 // The effect of an update on the history of its edge.
 namespace tfdude {
-namespace {
 
 Result<void> check_timing(const EdgeTiming& timing) {
   if (timing.span <= std::chrono::nanoseconds(0)) {
@@ -26,8 +25,6 @@ Result<void> check_timing(const EdgeTiming& timing) {
   }
   return {};
 }
-
-}  // namespace
 
 Forest::Impl::~Impl() {
   for (std::uint32_t slot = 0; slot < frames_.size(); ++slot) {
@@ -142,7 +139,7 @@ void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
 
 Result<void> Forest::clear_history(std::string_view id) {
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   const HeldVersion& edge = impl_->frames_.newest_value(*slot);
   if (!edge.moving() || edge.unsampled()) return {};
@@ -159,9 +156,15 @@ std::size_t Forest::clear_histories(Time from, std::optional<Time> jumped_from) 
   for (std::uint32_t slot = 0; slot < impl_->frames_.size(); ++slot) {
     if (!impl_->frames_.newest(slot).held()) continue;
     const HeldVersion& edge = impl_->frames_.newest_value(slot);
-    if (!edge.moving() || edge.lacks_sample() || edge.stamp < nanoseconds(from)) continue;
-    impl_->clear_history(edge);
+    if (!Impl::is_cleared(edge, nanoseconds(from))) continue;
     ++cleared;
+    const auto frozen = impl_->frozen_.find(slot);
+    if (frozen == impl_->frozen_.end()) {
+      impl_->clear_history(edge);
+      continue;
+    }
+    auto& later = frozen->second;
+    later = std::min(later.value_or(INT64_MAX), nanoseconds(from));
   }
   if (cleared > 0) impl_->commit();
   return cleared;
@@ -170,7 +173,7 @@ std::size_t Forest::clear_histories(Time from, std::optional<Time> jumped_from) 
 Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   if (auto ok = check_timing(timing); !ok) return fail_at("frame " + quote(id), ok.error());
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   const HeldVersion& newest = impl_->frames_.newest_value(*slot);
   const ChangedEdge kept = Impl::kept(newest);

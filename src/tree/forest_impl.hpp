@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+
 #include "tree/epoch.hpp"
 #include "tree/forest.hpp"
 #include "tree/frames.hpp"
@@ -13,6 +15,9 @@
 #include "tree/write_lock.hpp"
 
 namespace tfdude {
+
+/// @return kInvalidInput (naming the field).
+[[nodiscard]] Result<void> check_timing(const EdgeTiming& timing);
 
 /// The writer's side of Forest. It works under mutex_: it pushes versions on slots, and then
 /// commits them. It is one class, since one commit may concern structure, samples and correlations
@@ -155,6 +160,33 @@ class Forest::Impl {
     if (reclaimer_.samples().bytes() > full_at_) drop_down_to_limit();
   }
 
+  // Handing over (forest_handover.cpp).
+
+  /// @return kNotOwner if the held frame is being handed over
+  [[nodiscard]] Result<void> check_not_frozen(std::uint32_t slot) const TFDUDE_REQUIRES(mutex_) {
+    return frozen_.empty() ? Result<void>() : is_not_frozen(slot);
+  }
+  /// As Frames::held_slot(), for a change.
+  template <class Frame>
+  [[nodiscard]] Result<std::uint32_t> slot_to_change(Frame frame) const TFDUDE_REQUIRES(mutex_) {
+    auto slot = frames_.held_slot(frame);
+    if (!slot) return slot;
+    auto ok = check_not_frozen(*slot);
+    return ok ? slot : tl::unexpected(std::move(ok.error()));
+  }
+  /// Whether a jump back of the clock to that time clears the history of the edge.
+  [[nodiscard]] static bool is_cleared(const HeldVersion& edge, std::int64_t from) {
+    return edge.moving() && !edge.lacks_sample() && edge.stamp >= from;
+  }
+  /// The history of an edge that is taken over; null: none.
+  [[nodiscard]] SampleHistory* adopted_history(const HandedEdge& edge, std::uint64_t commit)
+      TFDUDE_REQUIRES(mutex_);
+  void adopt(const HandedEdge& edge) TFDUDE_REQUIRES(mutex_);
+  /// The frame may be changed again. @return whether its history was cleared
+  bool thaw(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  void hand_to(Owner owner, const HandedFrame& frame) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> check_handed(const HandedEdge& edge) const TFDUDE_REQUIRES(mutex_);
+
   // Values from another forest (forest_mirror.cpp).
 
   /// Pushes a value of one edge. @return whether it is new here
@@ -245,6 +277,9 @@ class Forest::Impl {
       TFDUDE_GUARDED_BY(mutex_);
   std::function<void(const HistoryRestart&)> restart_listener_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<std::uint64_t> structure_version_{0};
+  /// Held frames that are being handed over; after a jump of the clock, with the time to which it
+  /// has jumped back: then it clears the history when that is over.
+  std::map<std::uint32_t, std::optional<std::int64_t>> frozen_ TFDUDE_GUARDED_BY(mutex_);
   mutable WriteLock mutex_;
   Graph graph_ TFDUDE_GUARDED_BY(mutex_);
 
@@ -253,6 +288,7 @@ class Forest::Impl {
   T& push(Head& head) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> update_one(const HeldVersion& edge, const Transform& X_PC,
                                         const std::optional<Time>& stamp) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> is_not_frozen(std::uint32_t slot) const TFDUDE_REQUIRES(mutex_);
   /// The error for a value that is not finite.
   template <class Frame>
   [[nodiscard]] Result<void> not_finite(Frame frame, const Transform& X_PC);

@@ -289,7 +289,7 @@ Result<void> Forest::revise(const std::vector<Revision>& edges, std::optional<Ti
   const Writing lock(impl_->mutex_);
   std::vector<std::uint32_t> slots;
   for (const Revision& edge : edges) {
-    const auto slot = impl_->frames_.held_slot(edge.id);
+    const auto slot = impl_->slot_to_change(std::string_view(edge.id));
     if (!slot) return tl::unexpected(slot.error());
     auto ok = impl_->check_revision(impl_->frames_.newest_value(*slot), edge,
                                     edge.stamp ? edge.stamp : stamp, seen);

@@ -157,7 +157,7 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
 Result<void> Forest::check_rewrite(std::string_view id, const TimeInterval& interval,
                                    std::size_t count) const {
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   return impl_->check_rewrite(impl_->frames_.newest_value(*slot), interval, count);
 }
@@ -173,7 +173,7 @@ Result<void> Forest::rewrite(std::string_view id, const TimeInterval& interval,
   const std::int64_t from = nanoseconds(interval.from);
   const std::int64_t to = nanoseconds(interval.to);
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   const HeldVersion& edge = impl_->frames_.newest_value(*slot);
   if (auto ok = impl_->check_rewrite(edge, interval, samples.size()); !ok) return ok;

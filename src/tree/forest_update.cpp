@@ -189,6 +189,7 @@ template <class Frame>
   const Writing lock(mutex_);
   const HeldVersion* edge = frames_.newest_held(frame);
   if (edge == nullptr) return tl::unexpected(frames_.held_slot(frame).error());
+  if (auto ok = check_not_frozen(edge->slot); !ok) return ok;
   return update_one(*edge, X_PC, stamp);
 }
 
@@ -216,6 +217,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   for (const Update& update : edges) {
     const HeldVersion* edge = frames_.newest_held(update.*frame);
     if (edge == nullptr) return tl::unexpected(frames_.held_slot(update.*frame).error());
+    if (auto ok = check_not_frozen(edge->slot); !ok) return ok;
     if (!is_finite(update.X_PC)) return check_value(edge->name->text, update.X_PC);
     auto ok = check_said(update);
     // Other edges lose with a new value what observations have left.

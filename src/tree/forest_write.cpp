@@ -81,6 +81,7 @@ void Forest::Impl::make_absent(std::uint32_t slot) {
   if (frames_.newest(slot).held()) {
     give_back(frames_.newest_value(slot).samples);
     reclaimer_.supersede(frames_.newest_value(slot).correlation);
+    frozen_.erase(slot);
   }
   Version& fresh = push_remote(slot);
   fresh.attachment = 0;
@@ -155,6 +156,9 @@ Result<std::vector<std::string>> Forest::remove(std::string_view id, std::uint64
     const Version& version = impl_->frames_.newest(child);
     return version.held() && version.name->lamport_time.load(std::memory_order_relaxed) < before;
   });
+  for (const std::uint32_t slot : slots) {
+    if (auto ok = impl_->check_not_frozen(slot); !ok) return tl::unexpected(std::move(ok.error()));
+  }
   std::vector<std::string> removed;
   removed.reserve(slots.size());
   for (const std::uint32_t slot : slots) {
@@ -178,7 +182,7 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
                           const PartialTransform& X_PC, std::uint64_t lamport_time) {
   if (auto ok = check_id(parent, "parent"); !parent.empty() && !ok) return ok;
   const Writing lock(impl_->mutex_);
-  const auto slot = impl_->frames_.held_slot(id);
+  const auto slot = impl_->slot_to_change(id);
   if (!slot) return tl::unexpected(slot.error());
   const Impl::Pair pair = impl_->newest_pair(id, parent);
   if (!parent.empty() && (pair.above == nullptr || !pair.above->present())) {

@@ -60,6 +60,7 @@ class Author final : public Actor {
   void set_joint();
   void forget_one();
   void contest();
+  void hand_over(const std::string& id);
   using RouteOf = std::function<Result<std::vector<Part>>(Process& caller)>;
 
   void change(const std::string& what, const std::string& owner, const RouteOf& route, Then then);

@@ -3,6 +3,7 @@
 #include <set>
 #include <utility>
 
+#include "calls/hand_over_task.hpp"
 #include "simulation/author.hpp"
 
 // The calls of an author, and what they mean for its model.
@@ -246,6 +247,23 @@ void Author::judge(const std::string& a, const std::string& b, const Result<Stam
   remember();
 }
 
+void Author::hand_over(const std::string& id) {
+  const std::size_t owners = process_->world().plan.owners;
+  const std::string to = partition_name(random_.index(owners));
+  std::optional<std::string> parent;
+  if (random_.index(3) == 0) parent = base_of(random_.index(owners));
+  const std::string what = "hand-over " + id + " to " + to + (parent ? " under " + *parent : "");
+  began_ = process_->world().timeline.now();
+  by_node_ = false;
+  process_->begin(
+      what,
+      std::make_shared<HandOverTask>(process_->forest(), id, to, parent, PartialTransform(),
+                                     process_->world().timeline.steady() + RunningCall::kTimeout),
+      [this, self = shared_from_this(), what](const Result<void>& outcome) {
+        conclude(what, outcome, [](const Result<void>&) {});
+      });
+}
+
 // Any result is allowed, but in the end all must agree on it.
 void Author::contest() {
   const std::string id = contested_frame(random_.index(kContested));
@@ -255,6 +273,8 @@ void Author::contest() {
   const auto nothing = [](const Result<void>&) {};
   Forest& forest = process_->forest();
   Directory& directory = process_->directory();
+  // Nothing can be below itself.
+  if (parent == id) return hand_over(id);
   switch (random_.index(4)) {
     case 0:
       return begin(

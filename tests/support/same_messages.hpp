@@ -143,6 +143,64 @@ inline void check_same(const PartialUpdateRequest& actual, const PartialUpdateRe
   }
 }
 
+inline void check_same(const std::optional<EdgeTiming>& actual,
+                       const std::optional<EdgeTiming>& expected) {
+  REQUIRE(actual.has_value() == expected.has_value());
+  if (!actual) return;
+  CHECK(actual->span == expected->span);
+  CHECK(actual->count == expected->count);
+  CHECK(actual->process_noise.upper() == expected->process_noise.upper());
+  CHECK(actual->drifts == expected->drifts);
+  CHECK(actual->moving == expected->moving);
+  CHECK(actual->max_ahead == expected->max_ahead);
+  CHECK(actual->restart_after == expected->restart_after);
+}
+
+inline void check_same(const HandedSample& actual, const HandedSample& expected) {
+  CHECK(actual.stamp == expected.stamp);
+  CHECK(actual.is_row == expected.is_row);
+  CHECK(actual.made_up == expected.made_up);
+  check_same(actual.X_PC, expected.X_PC);
+  REQUIRE(actual.revision.has_value() == expected.revision.has_value());
+  if (!actual.revision) return;
+  check_same(actual.revision->given, expected.revision->given);
+  CHECK(actual.revision->correlation == expected.revision->correlation);
+  const RowInfo& came = actual.revision->row;
+  const RowInfo& sent = expected.revision->row;
+  CHECK(came.observed == sent.observed);
+  CHECK(came.between == sent.between);
+  CHECK(came.lasts == sent.lasts);
+  CHECK(came.follows == sent.follows);
+  CHECK(came.before == sent.before);
+}
+
+inline void check_same(const HandedPart& actual, const HandedPart& expected) {
+  CHECK(actual.incarnation == expected.incarnation);
+  CHECK(actual.first == expected.first);
+  CHECK(actual.begins == expected.begins);
+  CHECK(actual.is_last == expected.is_last);
+  REQUIRE(actual.edges.size() == expected.edges.size());
+  for (std::size_t i = 0; i < actual.edges.size(); ++i) {
+    const HandedEdge& came = actual.edges[i];
+    const HandedEdge& sent = expected.edges[i];
+    CHECK(came.id == sent.id);
+    CHECK(came.parent == sent.parent);
+    CHECK(came.lamport_time == sent.lamport_time);
+    CHECK(came.state == sent.state);
+    CHECK(came.left_behind == sent.left_behind);
+    check_same(came.timing, sent.timing);
+    check_same(came.X_PC, sent.X_PC);
+    CHECK(came.said == sent.said);
+    REQUIRE(came.now.has_value() == sent.now.has_value());
+    if (came.now) CHECK(*came.now == *sent.now);
+    CHECK(came.continues == sent.continues);
+    REQUIRE(came.samples.size() == sent.samples.size());
+    for (std::size_t j = 0; j < came.samples.size(); ++j) {
+      check_same(came.samples[j], sent.samples[j]);
+    }
+  }
+}
+
 inline void check_same(const Request& actual, const Request& expected) {
   CHECK(actual.sequence == expected.sequence);
   CHECK(actual.awaits_from == expected.awaits_from);
@@ -212,6 +270,19 @@ inline void check_same(const Request& actual, const Request& expected) {
       CHECK(arrived.samples[i].stamp == rewrite->samples[i].stamp);
       check_same(arrived.samples[i].X_PC, rewrite->samples[i].X_PC);
     }
+  } else if (const auto* handover = std::get_if<HandOverRequest>(&expected.body)) {
+    const auto& arrived = std::get<HandOverRequest>(actual.body);
+    CHECK(arrived.step == handover->step);
+    CHECK(arrived.to == handover->to);
+    CHECK(arrived.edge == handover->edge);
+    CHECK(arrived.after == handover->after);
+  } else if (const auto* adopt = std::get_if<AdoptRequest>(&expected.body)) {
+    const auto& arrived = std::get<AdoptRequest>(actual.body);
+    CHECK(arrived.from == adopt->from);
+    CHECK(arrived.parent == adopt->parent);
+    CHECK(arrived.lamport_time == adopt->lamport_time);
+    check_same(arrived.X_PC, adopt->X_PC);
+    check_same(arrived.part, adopt->part);
   } else if (const auto* joints = std::get_if<JointUpdate>(&expected.body)) {
     CHECK(listed(std::get<JointUpdate>(actual.body)) == listed(*joints));
   }

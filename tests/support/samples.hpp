@@ -111,6 +111,49 @@ bool take(const Bytes& bytes) {
   return part;
 }
 
+// A static edge without anything, and a dynamic one with samples of each kind.
+[[nodiscard]] inline HandedPart handed_part(Random& random) {
+  HandedPart part{kLastIncarnation, 4095, true, true, {}};
+  HandedEdge fixed;
+  fixed.id = "tool";
+  fixed.parent = "hand";
+  fixed.lamport_time = 7;
+  fixed.X_PC = unspecified(random);
+  part.edges.push_back(fixed);
+  HandedEdge edge;
+  edge.id = std::string(255, 'i');
+  edge.lamport_time = kLastCounter;
+  edge.state = HandedState::kSampled;
+  edge.left_behind = true;
+  edge.timing = EdgeTiming{std::chrono::nanoseconds(1),
+                           2,
+                           random.covariance(),
+                           true,
+                           true,
+                           std::chrono::nanoseconds::max(),
+                           18446744073709551615ULL};
+  edge.X_PC = random.transform();
+  edge.said = correlation(random);
+  edge.now = correlation(random);
+  edge.continues = true;
+  for (const std::int64_t stamp : {2, 3, 4, 5}) {
+    edge.samples.push_back({time_of(stamp), random.transform()});
+  }
+  edge.samples[1].X_PC.covariance = edge.samples[0].X_PC.covariance;
+  edge.samples[2].X_PC = unspecified(random);
+  edge.samples[2].made_up = true;
+  edge.samples[3].is_row = true;
+  edge.samples[3].revision =
+      SampleRevision{random.transform(), correlation(random), {true, true, 255, 3, 2}};
+  part.edges.push_back(edge);
+  fixed.id = "cleared";
+  fixed.state = HandedState::kCleared;
+  fixed.timing.emplace();
+  fixed.now.emplace();
+  part.edges.push_back(fixed);
+  return part;
+}
+
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
   return {
@@ -174,6 +217,14 @@ bool take(const Bytes& bytes) {
       {43, "hand",
        PartialUpdateRequest{{{"hand", {{}, {}, StatedCovariance::unspecified()}}}, time_of(1)}},
       {36, "odom", rewritten(random)},
+      {47, "hand", HandOverRequest{HandOverRequest::Step::kBegin, "arms"}},
+      {48, "hand",
+       HandOverRequest{HandOverRequest::Step::kRead, std::string(255, 'p'), 4294967295U,
+                       time_of(INT64_MAX)}},
+      {49, "hand", HandOverRequest{HandOverRequest::Step::kCancel, "arms"}},
+      {50, "hand", AdoptRequest{"arms", {}, {}, handed_part(random), kLastCounter}},
+      {51, "hand", AdoptRequest{"arms", "", unspecified(random), {}, 1}},
+      {52, "hand", AdoptRequest{"arms", std::string(255, 'p'), random.transform(), {}, 1}},
       {4294967295U, std::string(255, 'h'), MoveRequest{std::string(255, 'p'), {}},
        18446744073709551610ULL}};
 }
@@ -283,7 +334,9 @@ bool take(const Bytes& bytes) {
       {17, 1, DescriptionPart{18446744073709551615ULL, 1, std::string(kMaxDescriptionPart, '<')}},
       {18, 1, DescriptionPart{7, 8, "<robot/>"}},
       {19, 1, MemoryOffer{"kernel", "socket", {18446744073709551615ULL, 2}, 3, 4, ""}},
-      {20, 1, MemoryOffer{"", "", {}, 0, 0, "there is no memfd"}}};
+      {20, 1, MemoryOffer{"", "", {}, 0, 0, "there is no memfd"}},
+      {21, 1, handed_part(random)},
+      {22, 1, HandedPart{}}};
 }
 
 [[nodiscard]] inline std::vector<PushedValues> pushed_values(Random& random) {

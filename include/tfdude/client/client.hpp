@@ -218,6 +218,26 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] Result<void> move(const std::string& id, const std::string& parent,
                                   const PartialTransform& X_PC = {});
 
+  /// Hands a frame over to another partition, which must be reachable: from then on that owns it,
+  /// and all frames below it that its owner had and reaches through its own frames, with their
+  /// history, correlation, and history settings. A frame below them of another partition stays
+  /// where it is. Readers find the frame, with the same values, all the time. Changes and samples
+  /// are rejected for the moment that it takes, with kNotOwner if a call cannot wait. If anything
+  /// fails, the frame is as before; docs/handover.md says what a death of an owner leaves, and how
+  /// long it takes. Does nothing if the partition owns the frame already. O(frames and samples).
+  /// @return kUnknownFrame, kUnknownPartition; kInvalidInput (a joint moves one of the frames);
+  ///   kTooMuch (more than kMaxItems frames, or 65,536 samples; or the partition has no room);
+  ///   kNotOwner (another handover of the frame is in progress), kChangedMeanwhile (it has lasted
+  ///   too long, and the owner has kept the frame), kUnsupported (an owner of an earlier version).
+  [[nodiscard]] Result<void> hand_over(const std::string& id, const std::string& partition);
+  /// The same, and moves the frame below another parent (empty: makes it a root), in one step: as
+  /// by move(), its edge loses its history, and those of the frames below it keep theirs.
+  /// @param X_PC  as of move()
+  /// @return also kUnknownParent, kCycle.
+  [[nodiscard]] Result<void> hand_over(const std::string& id, const std::string& partition,
+                                       const std::string& parent,
+                                       const PartialTransform& X_PC = {});
+
   /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed
   /// in b. The instant is the newest for which all dynamic edges on the path have data. Covariance
   /// is propagated to second order. Correlations are those that the owners state (Correlation);

@@ -239,7 +239,8 @@ constexpr auto kReplyBody =
           TFDUDE_CASE_IF(12, SegmentValues, incomplete, kIncomplete, &has_no_rows),
           TFDUDE_CASE(13, DescriptionPart, description, kDescriptionPart),
           TFDUDE_CASE(14, MemoryOffer, memory, kMemory),
-          TFDUDE_CASE(15, SegmentValues, with_rows, kWithRows));
+          TFDUDE_CASE(15, SegmentValues, with_rows, kWithRows),
+          TFDUDE_CASE(16, HandedPart, handed, Handed()));
 
 constexpr auto kReply = record(
     TFDUDE_FIELD(epoch, epoch, kEpoch), TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime),

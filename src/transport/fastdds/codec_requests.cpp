@@ -109,6 +109,37 @@ constexpr auto kRewrite = Ruled(
            TFDUDE_FIELD(samples, samples, RewrittenSamples())),
     at_least_one(&RewriteRequest::samples, "a rewrite without samples"));
 
+// ---- handing over
+
+constexpr auto kHandOver = record(
+    TFDUDE_FIELD(after, after, Stamp("an instant of a handover")),
+    TFDUDE_FIELD(edge, edge, Count32()),
+    TFDUDE_FIELD(step, step, Enumerated(HandOverRequest::Step::kCancel, "a step of a handover")),
+    TFDUDE_FIELD(to, to, PartitionName()));
+
+struct Moves : Octet {
+  static void write(const AdoptRequest& adopt, std::uint8_t& wire) { wire = adopt.parent ? 1 : 0; }
+  static Result<void> read(std::uint8_t wire, AdoptRequest& adopt, const Place&) {
+    if (wire != 0) adopt.parent.emplace();
+    return {};
+  }
+};
+
+struct NewParent : Text {
+  static void write(const std::optional<std::string>& parent, wire::Identifier& wire) {
+    wire = parent.value_or("");
+  }
+  static Result<void> read(const wire::Identifier& wire, std::optional<std::string>& parent,
+                           const Place& place) {
+    return parent ? Text::read(wire, *parent, place) : Result<void>();
+  }
+};
+
+constexpr auto kAdopt = record(
+    TFDUDE_FIELD(lamport_time, lamport_time, kLamportTime), TFDUDE_FIELD_OF_ALL(moves, Moves()),
+    TFDUDE_FIELDS(X_PC, PartialNumbers()), TFDUDE_FIELD(from, from, PartitionName()),
+    TFDUDE_FIELD(parent, parent, NewParent()), TFDUDE_FIELD(part, part, Handed()));
+
 // ---- observations
 
 // Whether an edge has a new value, and that value.
@@ -304,7 +335,9 @@ constexpr auto kRequestBody = cases(
     TFDUDE_CASE(19, DescriptionRequest, description, kDescriptionRequest),
     TFDUDE_CASE(20, MemoryRequest, memory, MemoryOctet()),
     TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite),
-    TFDUDE_CASE(23, ReviseRequest, revise_rows, kReviseRows));
+    TFDUDE_CASE(23, ReviseRequest, revise_rows, kReviseRows),
+    TFDUDE_CASE(24, HandOverRequest, hand_over, kHandOver),
+    TFDUDE_CASE(25, AdoptRequest, adopt, kAdopt));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

@@ -89,6 +89,13 @@ struct JointSamples {
   static Result<void> read(const wire::Joints& wire, JointUpdate& update, const Place&);
 };
 
+/// What is known of frames that are handed over (codec_handover.cpp).
+struct Handed {
+  static void check(CdrReader& in);
+  static void write(const HandedPart& part, wire::HandedPart& wire);
+  static Result<void> read(const wire::HandedPart& wire, HandedPart& part, const Place& place);
+};
+
 /// What a watcher is sent (codec_streams.cpp).
 struct Pushed {
   static void check(CdrReader& in);

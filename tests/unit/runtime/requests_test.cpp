@@ -92,6 +92,23 @@ TEST_CASE("requests: a request fails with not_owner after a limited number of at
   CHECK(arm.asked() == Call::kAttempts);
 }
 
+TEST_CASE("requests: a request is tried more often if the structure changes after each attempt") {
+  LoopbackNetwork network;
+  Node eye = Node::open(network.join(), "eye", {}).value();
+  std::set<std::uint32_t> denied;  // each perhaps more than once
+  ScriptedOwner arm(
+      network, "arm", kArm, [&](Transport& transport, const PeerId& from, const Request& request) {
+        if (denied.insert(request.sequence).second) {
+          (void)eye.add("mark_" + std::to_string(denied.size()), "", along_x(1));
+        }
+        transport.reply(from, {request.sequence, 0, Error{Errc::kNotOwner, "not mine"}});
+        return true;
+      });
+  Rig rig(network.join());
+  CHECK(outcome(add_finger(rig, Deadline(30s))) == "not_owner");
+  CHECK(denied.size() == Call::kAttemptsInChange);
+}
+
 TEST_CASE("requests: an owner that does not know a parent yet is asked until it does") {
   LoopbackNetwork network;
   std::set<std::uint32_t> denied;  // each perhaps more than once

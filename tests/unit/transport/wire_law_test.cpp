@@ -116,6 +116,23 @@ ReviseRequest random_revision(Random& random) {
       random_stamp(random), random_count(random), random_count(random)};
 }
 
+HandedPart random_handed(Random& random) {
+  HandedPart part = testing::handed_part(random);
+  part.first = static_cast<std::uint32_t>(random_count(random));
+  part.is_last = random.index(2) == 0;
+  for (HandedEdge& edge : part.edges) {
+    edge.id = random_name(random);
+    edge.said = random_correlation(random);
+    edge.X_PC = random_transform(random);
+    edge.samples.resize(random.index(edge.samples.size() + 1));
+    for (HandedSample& sample : edge.samples) {
+      sample.is_row = random.index(2) == 0;
+      if (random.index(2) == 0) sample.X_PC = random_transform(random);
+    }
+  }
+  return part;
+}
+
 std::vector<Request> random_requests(Random& random) {
   const std::string first = random_name(random);
   auto edges = random_edges(random, 1);
@@ -159,6 +176,10 @@ std::vector<Request> random_requests(Random& random) {
   add(DescriptionRequest{random_count(random)});
   add(MemoryRequest{});
   add(TimeRequest{random_stamp(random)});
+  add(HandOverRequest{static_cast<HandOverRequest::Step>(1 + random.index(4)), "robot",
+                      static_cast<std::uint32_t>(random_count(random)), random_stamp(random)});
+  add(AdoptRequest{"robot", random.index(2) == 0 ? std::nullopt : std::optional(named()),
+                   random_parts(random), random_handed(random), random_count(random)});
   add(RewriteRequest{
       random_count(random),
       {random_stamp(random).value_or(Time()), random_stamp(random).value_or(Time())},
@@ -253,6 +274,7 @@ std::vector<Reply> random_replies(Random& random) {
                   count(),
                   count(),
                   random_name(random)});
+  add(random_handed(random));
   return all;
 }
 
