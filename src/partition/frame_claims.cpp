@@ -140,14 +140,6 @@ bool FrameClaims::may_take_from(Owner owner) const {
          succession_.reported_survivor(kHeldHere, owner);
 }
 
-// A handover that an earlier process of this partition has begun, ended by keeping the frame, or
-// taken part in as the new owner.
-bool FrameClaims::goes_on(std::uint64_t own, Owner owner, std::uint64_t theirs) const {
-  if (is_passed_on(own, theirs)) return true;
-  const bool open = is_adopted(own, theirs) || is_kept(own, theirs) || is_adopted(theirs, own);
-  return open && !succession_.reported_survivor(owner, kHeldHere);
-}
-
 Owner FrameClaims::holder(const std::string& id, std::optional<std::uint64_t> lamport_time) const {
   const auto there = forest_.info(id);
   if (!there) return kHeldHere;

@@ -56,6 +56,14 @@ bool FrameClaims::is_contested(const std::string& id) const {
          });
 }
 
+// A handover that an earlier process of this partition has begun, ended by keeping the frame, or
+// taken part in as the new owner.
+bool FrameClaims::goes_on(std::uint64_t own, Owner owner, std::uint64_t theirs) const {
+  if (is_passed_on(own, theirs)) return true;
+  const bool open = is_adopted(own, theirs) || is_kept(own, theirs) || is_adopted(theirs, own);
+  return open && !succession_.reported_survivor(owner, kHeldHere);
+}
+
 // Participants that have heard of the new owner do not need the former one's claim, and must not
 // fall back to it if the new owner removes the frame.
 void FrameClaims::note_passed_on(const std::string& id) {

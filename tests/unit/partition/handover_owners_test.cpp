@@ -323,6 +323,38 @@ TEST_CASE("handover: only the partition to which a frame is offered can adopt it
   check_only(arms, "arm2", 1);
 }
 
+TEST_CASE("handover: what its owner does not offer any more cannot be adopted, even if it stops") {
+  Arms arms;
+  const std::uint64_t before = arms.arm1->claim();
+  REQUIRE(arms.arm1->ask(HandOverRequest{Step::kBegin, "arm2"}) == "ok");
+  REQUIRE(arms.arm1->ask(HandOverRequest{Step::kRead, "arm2"}) == "ok");
+  HandedPart forged = arms.arm1->read;
+  HandedEdge& top = forged.edges.front();
+  const std::uint64_t offered = top.lamport_time;
+  top.X_PC = along_x(77);
+  const auto check_rejected = [&] {
+    for (const std::uint64_t time : {before, offered - kKept, offered, offered + kPassedOn}) {
+      INFO(time << " instead of " << arms.arm1->claim());
+      top.lamport_time = time;
+      CHECK(arms.arm2->ask(AdoptRequest{"arm1", {}, {}, forged, 0}) != "ok");
+      CHECK(arms.arm2->owner() == "arm1");
+    }
+  };
+  REQUIRE(arms.arm1->ask(HandOverRequest{Step::kCancel, "arm2"}) == "ok");
+  arms.arm1->save();
+  arms.meet();
+  check_rejected();
+  arms.arm2->lose(*arms.arm1, std::chrono::seconds(1));
+  check_rejected();
+  arms.restart_first();
+  arms.agree();
+  check_rejected();
+  arms.arm2->lose(*arms.arm1);
+  check_rejected();
+  arms.agree();
+  check_only(arms, "arm1", 1);
+}
+
 TEST_CASE("handover: who cancels too late hears that the other one has it") {
   Arms arms;
   arms.adopt();
