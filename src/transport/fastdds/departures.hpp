@@ -11,8 +11,8 @@
 namespace tfdude::fastdds {
 
 /// Participants of which a datagram said that they leave, without a proof: with keys, too, anybody
-/// may say so (DDS Security 1.1, 8.4.2.4). It is believed of those who are then silent for kSilence;
-/// each participant announces itself every 300 ms.
+/// may say so (DDS Security 1.1, 8.4.2.4). It is believed of those that are then silent for
+/// kSilence; each participant announces itself every 300 ms.
 /// @par Thread safety  All functions are thread-safe.
 class Departures {
  public:
