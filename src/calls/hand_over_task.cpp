@@ -60,12 +60,14 @@ Result<void> HandOverTask::plan(const Directory& directory, Clock::time_point) {
   if (!new_owner) return tl::unexpected(std::move(new_owner.error()));
   auto owner = route_to(directory, frame->owner, Request{0, id_, {}});
   if (!owner) return tl::unexpected(std::move(owner.error()));
-  if (owner->owner == new_owner->owner) {
-    return fail(Errc::kAlreadyExists,
-                "frame " + quote(id_) + " belongs to partition " + quote(to_) + " already");
-  }
+  const bool has_it = owner->owner == new_owner->owner;
   owner_ = *std::move(owner);
   new_owner_ = *std::move(new_owner);
+  // As far as is known here: it may have handed it over since, and its claim stays for a while.
+  if (has_it) {
+    ask_owner(State::kConfirm, {Step::kEnd, to_});
+    return {};
+  }
   new_owner_.request.id = id_;
   lamport_time_ = directory.latest_lamport_time();
   next_ = {Step::kRead, to_};
@@ -127,6 +129,13 @@ Result<Task::Next> HandOverTask::take(std::vector<Reply> replies, Clock::time_po
       ask_owner(is_last_ ? State::kEnd : State::kRead,
                 is_last_ ? HandOverRequest{Step::kEnd, to_} : next_);
       return Next::kAsk;
+    case State::kConfirm:
+      if (error == nullptr) {
+        return fail(Errc::kAlreadyExists,
+                    "frame " + quote(id_) + " belongs to partition " + quote(to_) + " already");
+      }
+      return fail(error->code == Errc::kChangedMeanwhile ? Errc::kNotOwner : error->code,
+                  error->message);
     case State::kEnd:
       if (error == nullptr) return Next::kDone;
       if (waits(error, now)) return Next::kPlan;

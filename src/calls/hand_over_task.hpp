@@ -35,7 +35,7 @@ class HandOverTask final : public Task {
   [[nodiscard]] Milliseconds pause() const override { return pause_; }
 
  private:
-  enum class State : std::uint8_t { kBegin, kRead, kGive, kEnd, kCancel };
+  enum class State : std::uint8_t { kConfirm, kBegin, kRead, kGive, kEnd, kCancel };
   using Step = HandOverRequest::Step;
 
   [[nodiscard]] Result<void> check_parent() const;
