@@ -32,6 +32,19 @@ Result<void> check_new_ids(const FrameSpec& frame) {
   return ok;
 }
 
+// What is not held of these segments, for a message. Looks at the first ones only: nothing limits
+// the edges of many.
+std::string unowned(const Forest& forest, const std::vector<PathEnds>& segments) {
+  constexpr std::ptrdiff_t kMost = 16;
+  const auto count = static_cast<std::ptrdiff_t>(segments.size());
+  const auto end = segments.begin() + std::min(count, kMost);
+  const auto missing = std::find_if(segments.begin(), end, [&](const PathEnds& segment) {
+    return !forest.lookup_segments({segment});
+  });
+  if (missing == end) return "does not own all of the path";
+  return "does not own the path from " + quote(missing->from) + " to " + quote(missing->to);
+}
+
 }  // namespace
 
 Partition::Partition(std::string name, std::uint64_t incarnation, Forest& forest,
@@ -157,20 +170,15 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
     values->incarnation = pages_.incarnation();
     reply.body = *std::move(values);
   } else if (const Errc code = values.error().code;
-             code == Errc::kNotYet || code == Errc::kTooOld || code == Errc::kInvalidInput) {
+             code == Errc::kNotYet || code == Errc::kTooOld || code == Errc::kInvalidInput ||
+             code == Errc::kTooMuch) {
     values.error().message.insert(0, "partition " + quote(name_) + ": ");
     reply.body = std::move(values.error());
   } else {
-    // If anything is missing, the caller's structure is not, or no longer, the owner's.
-    const auto missing = std::find_if(
-        lookup.segments.begin(), lookup.segments.end(),
-        [this](const PathEnds& segment) { return !forest_.lookup_segments({segment}); });
-    const std::string what =
-        missing == lookup.segments.end()
-            ? "owned no part of the path"
-            : "does not own the path from " + quote(missing->from) + " to " + quote(missing->to);
-    reply.body = Error{Errc::kNotOwner,
-                       "partition " + quote(name_) + " " + what + ": " + values.error().message};
+    // The caller's structure is not, or no longer, the owner's.
+    reply.body = Error{Errc::kNotOwner, "partition " + quote(name_) + " " +
+                                            unowned(forest_, lookup.segments) + ": " +
+                                            values.error().message};
   }
   return reply;
 }

@@ -1,5 +1,6 @@
 #include "partition/partition.hpp"
 
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -267,6 +268,32 @@ TEST_CASE("a lookup over an edge that is not owned is rejected and names the end
   REQUIRE(said(arms.ask("island", AddRequest{"", {}})) == "ok");
   CHECK(said(arms.ask("hand", LookupRequest{{{"island", "hand"}}}))
             .rfind(start + "'island' to 'hand'", 0) == 0);
+}
+
+// Once, the owner looked up each of 4096 segments of 3000 edges, for 0.4 s, to name the one that it
+// does not own.
+TEST_CASE("a lookup of too many edges is rejected at once, whatever is wrong with it") {
+  constexpr int kDeep = 3000;
+  Arms arms;
+  std::vector<FrameSpec> chain{{"f0", "base", along_x(1)}};
+  for (int i = 1; i <= kDeep; ++i) {
+    chain.push_back({"f" + std::to_string(i), "f" + std::to_string(i - 1), along_x(1)});
+  }
+  REQUIRE(arms.partition.load(chain, kNow));
+  std::vector<PathEnds> segments(4096, {"f0", "f" + std::to_string(kDeep)});
+  const auto ask = [&] {
+    const auto start = std::chrono::steady_clock::now();
+    const std::string answer = said(arms.ask("f0", LookupRequest{segments}));
+    CHECK(std::chrono::steady_clock::now() - start < std::chrono::milliseconds(100));
+    return answer;
+  };
+  CHECK(ask() == "too_much: partition 'arms': the 4096 segments have more than 65536 edges");
+  segments.back().to = "nobody";
+  CHECK(ask() ==
+        "not_owner: partition 'arms' does not own all of the path: no frame 'nobody' to end at");
+  segments.front().to = "nobody";
+  CHECK(ask().rfind("not_owner: partition 'arms' does not own the path from 'f0' to 'nobody'", 0) ==
+        0);
 }
 
 // ---- repetition and epochs
