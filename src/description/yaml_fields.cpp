@@ -38,10 +38,8 @@ Result<void> YamlFields::read_document(
     const std::string& text, const std::function<Result<void>(const YAML::Node&)>& read) const {
   if (auto ok = check_bytes(name_, text); !ok) return ok;
   try {
+    if (auto ok = check_documents(name_, text); !ok) return ok;
     const YAML::Node document = YAML::Load(text);
-    if (const auto second = second_document(text)) {
-      return error(Errc::kConfig, *second, "holds more than one YAML document");
-    }
     if (document.IsNull()) return fail(Errc::kConfig, name_ + ": is empty");
     return read(document);
   } catch (const YAML::Exception& e) {

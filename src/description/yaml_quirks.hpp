@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include <yaml-cpp/yaml.h>
@@ -21,7 +20,10 @@ namespace tfdude {
 /// "+1".
 [[nodiscard]] std::string plain_number(const std::string& text);
 
-/// The start of a second document, if there is one.
-[[nodiscard]] std::optional<YAML::Mark> second_document(const std::string& text);
+/// Rejects a second document, and aliases that would make a reader work without end: one that
+/// stands for what it is in, and those that repeat, or nest, more than a file of people does.
+/// Afterwards, a reader may follow aliases as if they were written out. Linear in the text.
+/// @return kConfig naming the file and line, kTooMuch; throws YAML::Exception if it is not YAML
+[[nodiscard]] Result<void> check_documents(const std::string& name, const std::string& text);
 
 }  // namespace tfdude

@@ -153,4 +153,35 @@ TEST_CASE("launch file: a start in a variable of a shell script is rejected by n
   }
 }
 
+// Once, the first of these ended the program, and the second did not end.
+TEST_CASE("launch file: aliases in YAML cannot make it endless") {
+  const std::string start =
+      "node: {pkg: tf2_ros, exec: static_transform_publisher, args: '0 0 0 0 0 0 a b'}\n";
+  CHECK(edges_of("launch: &g\n- group: *g\n- " + start) ==
+        "file:2: an alias stands for what it is in");
+  CHECK(edges_of("launch:\n- &g\n  group: [*g]\n- " + start) ==
+        "file:3: an alias stands for what it is in");
+  // Each group has twice what the one before has.
+  const auto doubled = [&](int times) {
+    std::string text = "launch:\n- group: &g0\n  - " + start;
+    for (int i = 1; i <= times; ++i) {
+      const std::string before = "{group: *g" + std::to_string(i - 1) + "}";
+      text += "- group: &g" + std::to_string(i) + " [" + before + ", " + before + "]\n";
+    }
+    return text;
+  };
+  CHECK_THAT(edges_of(doubled(26)), ContainsSubstring(": aliases repeat more than 2000000 values"));
+  CHECK_THAT(edges_of(doubled(200)),
+             ContainsSubstring(": aliases repeat more than 2000000 values"));
+  // Each has what the one before has, two levels deeper.
+  std::string nested = "launch:\n- group: &g0\n  - " + start;
+  for (int i = 1; i <= 300; ++i) {
+    nested += "- group: &g" + std::to_string(i) + " [{group: *g" + std::to_string(i - 1) + "}]\n";
+  }
+  CHECK_THAT(edges_of(nested), ContainsSubstring(": aliases nest more than 500 levels"));
+  CHECK(edges_of("launch:\n- &n\n  " + start + "- group: [{group: [*n]}]\n") != "a>b ");
+  CHECK(edges_of("x: &n {" + start.substr(0, start.size() - 1) + "}\nlaunch:\n- group: [*n]\n") ==
+        "a>b ");
+}
+
 }  // namespace tfdude
