@@ -10,6 +10,7 @@
 #include "partition/incarnation.hpp"
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
+#include "store/log_check.hpp"
 #include "store/read_state.hpp"
 #include "store/row_sums.hpp"
 #include "store/rows.hpp"
@@ -43,6 +44,8 @@ class SqliteStore final : public StateStore {
   SqliteStore& operator=(const SqliteStore&) = delete;
 
   Result<void> open(const std::string& partition);
+  /// The same, but leaves out the changes of a damaged log.
+  Result<void> open_without_damage(const std::string& partition);
 
   Result<StoredState> load() override;
   Result<void> save(const StateChange& change) override;
@@ -54,6 +57,7 @@ class SqliteStore final : public StateStore {
   [[nodiscard]] tl::unexpected<Error> unusable(const std::string& why) const;
   [[nodiscard]] tl::unexpected<Error> unreadable(const std::string& why) const;
   Result<void> lock();
+  Result<void> check_log();
   Result<void> check(const std::string& partition);
   Result<void> check_tables(std::int64_t format);
   Result<void> bring_up_to_date();
@@ -75,6 +79,8 @@ class SqliteStore final : public StateStore {
   const StoreSync sync_;
   std::string partition_;
   std::optional<Database> database_;
+  bool drops_damage_ = false;  // of the log
+  std::optional<std::string> dropped_;
   bool ready_ = false;             // to be written to
   bool written_ = false;           // by this process
   std::int64_t format_ = kFormat;  // of the file as it is
@@ -119,6 +125,11 @@ SqliteStore::~SqliteStore() {
   if (ready_ && database_->is_gone()) database_->tidy_up_at_close(false);
 }
 
+Result<void> SqliteStore::open_without_damage(const std::string& partition) {
+  drops_damage_ = true;
+  return open(partition);
+}
+
 Result<void> SqliteStore::open(const std::string& partition) {
   partition_ = partition;
   std::error_code error;
@@ -145,10 +156,25 @@ Result<void> SqliteStore::lock() {
               : unreadable(locked.error().message);
 }
 
+// Nobody else writes the log now.
+Result<void> SqliteStore::check_log() {
+  const std::string log = file_ + "-wal";
+  const auto damaged = find_damage(log);
+  if (!damaged) return {};
+  if (drops_damage_) {
+    dropped_ = to_string(*damaged, log);
+    return {};
+  }
+  return unusable("is damaged (a checksum is wrong: " + to_string(*damaged, log) +
+                  "): put a copy of both files back, move both away to start from the "
+                  "configuration, or leave these changes out with tfduded --drop-damaged");
+}
+
 // Writes nothing before it is known that the file belongs to this partition or is new. Reads no
 // table before it is known that they are plain tables.
 Result<void> SqliteStore::check(const std::string& partition) {
   if (auto locked = lock(); !locked) return locked;
+  if (auto whole = check_log(); !whole) return whole;
   const auto application = database_->number("PRAGMA application_id");
   const auto format = database_->number("PRAGMA user_version");
   const auto tables = database_->number("SELECT count(*) FROM sqlite_master");
@@ -300,6 +326,13 @@ Result<StoredState> SqliteStore::load() {
 
 Result<std::vector<std::string>> SqliteStore::drop_wrong_rows() {
   std::vector<std::string> dropped;
+  if (dropped_) {
+    // Merges what is left of the log, and begins another.
+    auto done = make_ready();
+    if (done) done = database_->run("PRAGMA wal_checkpoint(TRUNCATE)");
+    if (!done) return unusable("could not be mended: " + done.error().message);
+    dropped.push_back(*dropped_);
+  }
   if (format_ < kSumsFormat) return dropped;
   const auto wrong = find_wrong_rows(*database_, format_);
   if (!wrong) return unreadable(wrong.error().message);
@@ -480,7 +513,9 @@ Result<std::vector<std::string>> drop_wrong_rows(const std::string& file,
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return std::vector<std::string>();
   SqliteStore store(file, StoreSync::kEachChange);
-  if (auto opened = store.open(partition); !opened) return tl::unexpected(opened.error());
+  if (auto opened = store.open_without_damage(partition); !opened) {
+    return tl::unexpected(opened.error());
+  }
   return store.drop_wrong_rows();
 }
 
