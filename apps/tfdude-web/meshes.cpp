@@ -12,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tfdude/description/urdf_file.hpp"
 #include "tfdude/math/pose.hpp"
 
 #include "../rendering/json.hpp"
@@ -173,10 +174,11 @@ Result<std::vector<std::string>> add_meshes(const std::string& urdf,
   json visuals = json::array();
   std::vector<std::string> left_out;
   if (!urdf.empty()) {
+    const auto text = load_urdf_text(urdf);
+    if (!text) return tl::unexpected(text.error());
     tinyxml2::XMLDocument document;
-    document.LoadFile(urdf.c_str());
-    const XMLElement* robot = document.FirstChildElement("robot");
-    if (robot == nullptr) return fail(Errc::kConfig, urdf + " is no URDF that can be read");
+    document.Parse(text->data(), text->size());
+    const XMLElement* robot = document.RootElement();
     const Finder finder(urdf, folders);
     Meshes meshes(files);
     for (auto* link = robot->FirstChildElement("link"); link != nullptr;

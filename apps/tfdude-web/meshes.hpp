@@ -14,7 +14,7 @@ namespace tfdude::web {
 /// without shapes.
 /// @param folders  where its packages are: package://NAME/FILE is FOLDER/NAME/FILE, or FOLDER/FILE
 ///   in a folder of that name
-/// @return what was left out, for the log; kConfig: the URDF cannot be read
+/// @return what was left out, for the log; errors of load_urdf_text()
 [[nodiscard]] Result<std::vector<std::string>> add_meshes(const std::string& urdf,
                                                           const std::vector<std::string>& folders,
                                                           Files& files);

@@ -10,6 +10,7 @@
 #include <tinyxml2.h>
 
 #include "tfdude/base/id.hpp"
+#include "tfdude/description/urdf_file.hpp"
 
 #include "description/file_edges.hpp"
 #include "description/file_text.hpp"
@@ -239,18 +240,33 @@ class TextReader {
   tinyxml2::XMLPrinter printer_;
 };
 
+Result<const XMLElement*> parse_robot(tinyxml2::XMLDocument& document, const std::string& text,
+                                      const std::string& file) {
+  auto root = parse_xml(document, text, file);
+  if (!root) return root;
+  const XMLElement* robot = *root;
+  if (robot == nullptr) return fail(Errc::kConfig, file + ": has no element <robot>");
+  if (std::strcmp(robot->Name(), "robot") == 0) return root;
+  return file_error(Errc::kConfig, file, robot->GetLineNum(),
+                    "not a URDF: <" + printable(robot->Name()) + "> instead of <robot>");
+}
+
 }  // namespace
+
+Result<std::string> load_urdf_text(const std::string& file) {
+  auto text = read_text(file);
+  if (!text) return text;
+  tinyxml2::XMLDocument document;
+  const auto robot = parse_robot(document, *text, printable(file));
+  if (!robot) return tl::unexpected(robot.error());
+  return text;
+}
 
 Result<UrdfText> read_urdf_text(const std::string& text, const std::string& file) {
   tinyxml2::XMLDocument document;
-  const auto root = parse_xml(document, text, file);
+  const auto root = parse_robot(document, text, file);
   if (!root) return tl::unexpected(root.error());
   const XMLElement* robot = *root;
-  if (robot == nullptr) return fail(Errc::kConfig, file + ": has no element <robot>");
-  if (std::strcmp(robot->Name(), "robot") != 0) {
-    return file_error(Errc::kConfig, file, robot->GetLineNum(),
-                      "not a URDF: <" + printable(robot->Name()) + "> instead of <robot>");
-  }
   XacroSearch search;
   robot->Accept(&search);
   if (search.found() != nullptr) {

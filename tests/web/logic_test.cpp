@@ -252,4 +252,20 @@ TEST_CASE("web: only meshes that a URDF names are served, and only from below it
   CHECK_FALSE(add_meshes(folder.path() + "/none.urdf", {}, files));
 }
 
+// Once, 300,000 attributes took minutes.
+TEST_CASE("web: a URDF is read within the limits of the daemon, and errors say the line") {
+  const testing::TemporaryDirectory folder;
+  const auto error_of = [&](const std::string& text) {
+    Files files;
+    const auto added = add_meshes(folder.write("robot.urdf", text), {}, files);
+    return added ? "ok" : added.error().message;
+  };
+  const std::string file = folder.path() + "/robot.urdf";
+  std::string many = "<robot";
+  for (int i = 0; i < 300'000; ++i) many += " a" + std::to_string(i) + "=''";
+  CHECK(error_of(many + "/>") == file + ":1: an element has more than 256 attributes");
+  CHECK(error_of("<robot>\n<link></robot>").rfind(file + ":2: not XML: ", 0) == 0);
+  CHECK(error_of("<world/>") == file + ":1: not a URDF: <world> instead of <robot>");
+}
+
 }  // namespace tfdude::web
