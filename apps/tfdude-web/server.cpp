@@ -33,6 +33,7 @@ constexpr std::size_t kMostConnections = 64;  // of WebSocket
 // Those that have not shown that they may enter have places of their own, and little time.
 constexpr std::size_t kMostVisits = 64;
 constexpr std::chrono::seconds kStrangersTime{1};
+constexpr std::chrono::seconds kPieceTime{2};  // for a client to take some of its answer
 constexpr std::size_t kMostMessage = std::size_t{64} << 10U;  // of a client [B]
 constexpr std::uint32_t kMostHead = 8192;                     // of a request [B]
 // Control messages wait for clients that do not read, until this many bytes do, of one and of all.
@@ -83,7 +84,7 @@ struct Shared {
   Site site;
   std::set<std::shared_ptr<Connection>> talking;
   std::size_t open = 0;           // connections
-  std::list<Visit*> visits;       // the oldest first
+  std::list<Visit*> visits;       // the one for which nothing has moved for longest first
   std::size_t waiting_bytes = 0;  // of all connections
 };
 
@@ -238,16 +239,26 @@ class Visit : public std::enable_shared_from_this<Visit> {
     known_ = reply.status < kFirstError;
     body_ = reply.body;
     response_ = response_of(reply, parser_->get());
-    stream_.expires_after(kRequestTime);
-    http::async_write(stream_, *response_,
-                      [self = shared_from_this()](error_code error, std::size_t) {
-                        if (error) return;
-                        if (self->response_->need_eof()) {
-                          self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
-                        } else {
-                          self->read();
-                        }
-                      });
+    serializer_.emplace(*response_);
+    end_ = std::chrono::steady_clock::now() + kRequestTime;
+    write_piece();
+  }
+
+  void write_piece() {
+    shared_.visits.splice(shared_.visits.end(), shared_.visits, place_);
+    stream_.expires_at(std::min(end_, std::chrono::steady_clock::now() + kPieceTime));
+    http::async_write_some(stream_, *serializer_,
+                           [self = shared_from_this()](error_code error, std::size_t) {
+                             if (error) return;
+                             if (!self->serializer_->is_done()) return self->write_piece();
+                             self->written();
+                           });
+  }
+
+  void written() {
+    if (!response_->need_eof()) return read();
+    error_code ignored;
+    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
   }
 
   beast::tcp_stream stream_;
@@ -258,6 +269,8 @@ class Visit : public std::enable_shared_from_this<Visit> {
   bool known_ = false;  // its last request was answered with what it asked for
   std::shared_ptr<const std::string> body_;
   std::optional<Response> response_;
+  std::optional<http::response_serializer<http::span_body<const char>>> serializer_;
+  std::chrono::steady_clock::time_point end_;  // of the time for the answer
 };
 
 class BeastServer final : public Server {
@@ -314,14 +327,15 @@ class BeastServer final : public Server {
     });
   }
 
-  // The stranger that has waited for longest goes first.
+  // The stranger that has waited for longest goes first; if there is none, the visit for which
+  // nothing has moved for longest: it is idle, or does not read.
   bool make_room() {
     if (shared_.visits.size() < kMostVisits) return true;
-    const auto stranger = std::find_if(shared_.visits.begin(), shared_.visits.end(),
-                                       [](const Visit* visit) { return visit->is_stranger(); });
-    if (stranger == shared_.visits.end()) return false;
-    (*stranger)->close();  // its handler runs later, and deletes it
-    shared_.visits.splice(shared_.visits.end(), shared_.visits, stranger);
+    auto last = std::find_if(shared_.visits.begin(), shared_.visits.end(),
+                             [](const Visit* visit) { return visit->is_stranger(); });
+    if (last == shared_.visits.end()) last = shared_.visits.begin();
+    (*last)->close();  // its handler runs later, and deletes it
+    shared_.visits.splice(shared_.visits.end(), shared_.visits, last);
     return shared_.visits.size() < 2 * kMostVisits;
   }
 

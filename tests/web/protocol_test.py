@@ -121,6 +121,30 @@ class Protocol(rig.RigTest):
             for one in silent:
                 one.close()
 
+    # Once, these locked the page out for 30 s.
+    def test_connections_that_do_not_read_keep_nobody_out(self):
+        address = self.robot.url.split("//")[1].split("/")[0].split(":")
+        deaf = []
+        try:
+            for _ in range(70):
+                one = socket.socket()
+                deaf.append(one)
+                one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+                one.settimeout(rig.WAIT)
+                one.connect((address[0], int(address[1])))
+                try:
+                    one.sendall(f"GET / HTTP/1.1\r\nHost: {':'.join(address)}\r\n\r\n".encode() * 50)
+                except OSError:
+                    pass  # it has made room
+            start = time.monotonic()
+            for _ in range(5):
+                with urllib.request.urlopen(self.robot.url, timeout=rig.WAIT) as reply:
+                    self.assertEqual(reply.status, 200)
+            self.assertLess(time.monotonic() - start, 5)
+        finally:
+            for one in deaf:
+                one.close()
+
     def test_all_frames_and_their_values(self):
         async def talk():
             async with connect(self.robot) as socket:
