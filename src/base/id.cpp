@@ -145,6 +145,18 @@ std::string printable(std::string_view text) {
   return out;
 }
 
-std::string quote(std::string_view text) { return "'" + printable(text) + "'"; }
+// Each id is shown whole. What is longer comes from a file or a stranger, and could fill a log.
+std::string quote(std::string_view text) {
+  constexpr std::size_t kLongest = 300;
+  constexpr std::size_t kShown = 200;
+  if (text.size() <= kLongest) return "'" + printable(text) + "'";
+  std::size_t shown = kShown;
+  const auto continues = [&](std::size_t at) {
+    return (static_cast<std::uint8_t>(text[at]) & 0xC0U) == 0x80U;
+  };
+  while (shown > kShown - 3 && continues(shown)) --shown;  // no part of a character
+  return "'" + printable(text.substr(0, shown)) + "...' (" + std::to_string(text.size()) +
+         " bytes)";
+}
 
 }  // namespace tfdude

@@ -103,7 +103,7 @@ Result<double> YamlFields::number(const YAML::Node& node, const std::string& wha
   }
   if (code == std::errc::result_out_of_range) {
     return error(Errc::kInvalidInput, node.Mark(),
-                 what + " is " + node.Scalar() + ", which no double can hold");
+                 what + " is " + tfdude::quote(node.Scalar()) + ", which no double can hold");
   }
   if (!std::isfinite(value)) {
     return error(Errc::kInvalidInput, node.Mark(), what + " is not a finite number");

@@ -154,6 +154,17 @@ TEST_CASE("printable is the same as quote but without the quotes") {
   CHECK(printable("'arm' \xE2\x82\xAC\n\xFF") == "'arm' \xE2\x82\xAC\\x0a\\xff");
 }
 
+TEST_CASE("of a long text only the begin is quoted, and each id as a whole") {
+  const std::string id(kMaxIdBytes, 'a');
+  CHECK(quote(id) == "'" + id + "'");
+  CHECK(quote(std::string(1'000'000, 'a')) == "'" + std::string(200, 'a') + "...' (1000000 bytes)");
+  // No character is divided.
+  std::string signs = "a";
+  for (int i = 0; i < 200; ++i) signs += "\xC3\xA9";
+  CHECK(quote(signs) == "'" + signs.substr(0, 199) + "...' (401 bytes)");
+  CHECK(quote(std::string(400, '\x80')).size() < 1000);
+}
+
 TEST_CASE("quote keeps printable text and escapes the rest") {
   CHECK(quote("") == "''");
   CHECK(quote("arm_1") == "'arm_1'");

@@ -208,6 +208,15 @@ TEST_CASE("anchors and aliases stand for their values") {
   check_refused_at("frames: *nowhere\n", "robot.yaml:1: not YAML: ");
 }
 
+// Once, the message had as many bytes as the file.
+TEST_CASE("an error repeats only the begin of a long value") {
+  const auto config = tfdude::parse_config(
+      "frames:\n  - {id: a, xyz: [1" + std::string(1'000'000, '0') + ", 0, 0]}\n", "f");
+  REQUIRE_FALSE(config);
+  CHECK(config.error().message.size() < 400);
+  CHECK(config.error().message.rfind("f:2: frame 'a': xyz[0] is '1000", 0) == 0);
+}
+
 TEST_CASE("a file of the wrong structure is rejected") {
   check_refused({"", Errc::kConfig, "robot.yaml: is empty"});
   check_refused({"# only a comment\n\n", Errc::kConfig, "robot.yaml: is empty"});
@@ -293,7 +302,7 @@ TEST_CASE("an invalid value is rejected by field") {
   check_refused({camera("    quat: [nan, 0, 0, 1]"), Errc::kInvalidInput,
                  "robot.yaml:4: frame 'camera': quat[0] is not a finite number"});
   check_refused({camera("    xyz: [1e999, 0, 0]"), Errc::kInvalidInput,
-                 "robot.yaml:4: frame 'camera': xyz[0] is 1e999, which no double can hold"});
+                 "robot.yaml:4: frame 'camera': xyz[0] is '1e999', which no double can hold"});
   check_refused({camera("    xyz: [0, 0, 2e9]"), Errc::kInvalidInput,
                  "robot.yaml:4: frame 'camera': xyz: translation.z is beyond 1e9 m"});
   check_refused({camera("    parent: world\n    quat: [0, 0, 0, 2]"), Errc::kInvalidInput,
