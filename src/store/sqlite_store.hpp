@@ -31,7 +31,8 @@ enum class StoreSync {
     const std::string& file, const std::string& partition,
     StoreSync sync = StoreSync::kAtCheckpoints);
 
-/// Erases the rows of a state file whose checksums are wrong, and what belongs to them.
+/// Erases the rows of a state file whose checksums are wrong, and what belongs to them; and what
+/// its log has behind the first damage, see find_damage().
 /// @return each of them, such as "frames 'hand'"; kState as open_sqlite_store()
 [[nodiscard]] Result<std::vector<std::string>> drop_wrong_rows(const std::string& file,
                                                                const std::string& partition);
