@@ -1,6 +1,8 @@
 #include "recording/state.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
@@ -14,6 +16,9 @@ namespace {
 constexpr std::size_t kMostSamples = 2'000'000;
 constexpr std::size_t kLeastSamples = 64;
 constexpr std::size_t kMostOfOneEdge = 65'536;
+
+// Frames of a damaged file that wait for others to move; more of them stay roots.
+constexpr std::size_t kMostCut = 1000;
 
 // The frames of another process come at once with the news that its partition is reachable. If
 // nothing comes for so long, it is the same process.
@@ -46,30 +51,55 @@ State::Known& State::partition(const std::string& name) {
   return known;
 }
 
+// Each owner's frames are in one message. All that change their parent are detached before one is
+// attached, as a frame and the one below it may change places.
 // @param begins  of another process, which has other values
-void State::put(Known& known, const WatchedFrame& frame, bool begins) {
-  const auto before = forest_.info(frame.id);
-  const std::string& owner = owners_[frame.id];
+void State::put(Known& known, const std::vector<WatchedFrame>& frames, bool begins) {
+  std::vector<const WatchedFrame*> detached;
+  for (const WatchedFrame& frame : frames) {
+    if (detach(known, frame, begins)) detached.push_back(&frame);
+  }
+  share_memory();
+  for (const WatchedFrame* frame : detached) {
+    // A damaged file may name it twice.
+    if (known.frames.at(frame->id) == frame->parent) attach(*frame);
+  }
+}
+
+// Notes an edge. @return whether it is another one than before: then its frame is nowhere
+bool State::detach(Known& known, const WatchedFrame& frame, bool begins) {
+  std::string& owner = owners_[frame.id];
   if (owner != known.info.name) {
-    begins = true;
     if (const auto other = partitions_.find(owner); other != partitions_.end()) {
       other->second.places.clear();
       other->second.frames.erase(frame.id);
     }
-    owners_[frame.id] = known.info.name;
+    owner = known.info.name;
   }
-  known.frames[frame.id] = frame.parent;
+  const auto [noted, fresh] = known.frames.emplace(frame.id, frame.parent);
+  const bool moved = std::exchange(noted->second, frame.parent) != frame.parent;
   known.places.clear();
   settled_.clear();
-  share_memory();
-  if (before && before->parent == frame.parent && !begins) return;
-  if (before) (void)forest_.release(frame.id);
-  // A cycle can only be in a damaged file; the frame then waits for another parent.
-  constexpr auto kAllow = Forest::MissingParent::kAllow;
-  if (!forest_.add(frame.id, frame.parent, Transform(), kAllow)) {
-    (void)forest_.add(frame.id, "", Transform());
-  }
+  if (!fresh && !moved && !begins) return false;
+  (void)forest_.release(frame.id);
+  cut_.erase(frame.id);
   if (!frame.parent.empty()) valueless_.insert(frame.id);
+  return true;
+}
+
+void State::attach(const WatchedFrame& frame) {
+  const auto added =
+      forest_.add(frame.id, frame.parent, Transform(), Forest::MissingParent::kAllow);
+  if (added || added.error().code != Errc::kCycle) return;
+  (void)forest_.add(frame.id, "", Transform());
+  if (cut_.size() < kMostCut) cut_.emplace(frame.id, frame.parent);
+}
+
+// Connects frames whose recorded parents were below them.
+void State::mend() {
+  for (auto cut = cut_.begin(); cut != cut_.end();) {
+    cut = forest_.attach(cut->first, cut->second) ? cut_.erase(cut) : std::next(cut);
+  }
 }
 
 void State::drop(Known& known, const std::string& id) {
@@ -80,6 +110,7 @@ void State::drop(Known& known, const std::string& id) {
   settled_.clear();
   known.frames.erase(id);
   valueless_.erase(id);
+  cut_.erase(id);
   (void)forest_.release(id);
 }
 
@@ -124,7 +155,8 @@ void State::apply(const RecordedFrames& frames, Time log) {
     }
   }
   for (const std::string& id : gone) drop(known, id);
-  for (const WatchedFrame& frame : frames.frames) put(known, frame, begins);
+  put(known, frames.frames, begins);
+  mend();
   frames_changed_ = frames.complete || !frames.frames.empty() || !gone.empty();
   known.info.frames = known.frames.size();
 }
@@ -147,8 +179,8 @@ std::optional<Handle> State::edge_of(Known& known, const RecordedEdge& edge, boo
   const auto frame = known.frames.find(edge.id);
   if (frame == known.frames.end() || frame->second != edge.parent) {
     if (!foreign) return std::nullopt;
-    if (!forest_.exists(edge.parent)) put(known, {edge.parent, ""});
-    put(known, edge);
+    if (!forest_.exists(edge.parent)) put(known, {WatchedFrame{edge.parent, ""}});
+    put(known, {edge});
     frames_changed_ = true;
   }
   return forest_.find(edge.id);

@@ -86,7 +86,10 @@ class State {
   [[nodiscard]] std::optional<Handle> edge_of(Known& known, const RecordedEdge& edge, bool repeats,
                                               bool foreign);
   [[nodiscard]] static PartitionNews news_of(const RecordedValues& recorded, Known& known);
-  void put(Known& known, const WatchedFrame& frame, bool begins = false);
+  void put(Known& known, const std::vector<WatchedFrame>& frames, bool begins = false);
+  [[nodiscard]] bool detach(Known& known, const WatchedFrame& frame, bool begins);
+  void attach(const WatchedFrame& frame);
+  void mend();
   [[nodiscard]] std::optional<Lost> lost(const std::vector<FrameInfo>& edges) const;
   void drop(Known& known, const std::string& id);
   void share_memory();
@@ -100,6 +103,9 @@ class State {
   std::map<std::string, Known> partitions_;
   std::unordered_map<std::string, std::string> owners_;  // by frame
   std::unordered_set<std::string> valueless_;            // frames whose edge has no value yet
+  // Frames that are roots because their recorded parents, which these are, are below them. The
+  // news of several owners come one after the other, so that those move next.
+  std::map<std::string, std::string> cut_;
   // What is known of edges by their numbers, so that no names are looked up for each value.
   struct Settled {
     const Known* partition = nullptr;

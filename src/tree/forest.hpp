@@ -237,6 +237,11 @@ class Forest {
                                   const PartialTransform& X_PC = {},
                                   std::uint64_t lamport_time = 0);
 
+  /// Connects a held root with a parent, which may be missing. Its value and its history are those
+  /// of the new edge. O(subtree).
+  /// @return kUnknownFrame, kNotOwner, kCycle, kInvalidInput (the id of the parent).
+  [[nodiscard]] Result<void> attach(std::string_view id, std::string_view parent);
+
   // --- handing over ---
 
   /// Rejects changes of held frames with kNotOwner, until thaw(), which then clears the histories

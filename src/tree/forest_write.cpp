@@ -204,4 +204,18 @@ Result<void> Forest::move(std::string_view id, std::string_view parent,
   return {};
 }
 
+Result<void> Forest::attach(std::string_view id, std::string_view parent) {
+  if (auto ok = check_id(parent, "parent"); !ok) return ok;
+  const Writing lock(impl_->mutex_);
+  const auto slot = impl_->frames_.held_slot(id);
+  if (!slot) return tl::unexpected(slot.error());
+  const Impl::Pair pair = impl_->newest_pair(id, parent);
+  if (auto ok = impl_->check_no_cycle(pair); !ok) return ok;
+  const std::uint32_t parent_slot = impl_->parent_slot(pair);
+  HeldVersion& fresh = impl_->push_held(*slot, impl_->frames_.newest_value(*slot).X_PC);
+  impl_->relink(fresh, parent_slot);
+  impl_->commit_structure();
+  return {};
+}
+
 }  // namespace tfdude
