@@ -1,4 +1,4 @@
-"""The end of the interpreter, fork() and signals: nothing hangs, crashes or is left silently."""
+"""Threads, the end of the interpreter, fork() and signals: nothing hangs, crashes or is left silently."""
 
 import os
 import signal
@@ -40,6 +40,18 @@ def test_exit_with_everything_open():
         subscription = client.on_change(print)
         events = client.events()
         stream = client.stream(["tool"])
+    """)
+
+
+def test_threads_read_the_first_arrays_at_once():
+    run("""
+        barrier = threading.Barrier(4)
+        def read():
+            barrier.wait()
+            client.lookup("base", "tool").translation
+        threads = [threading.Thread(target=read) for _ in range(4)]
+        for thread in threads: thread.start()
+        for thread in threads: thread.join()
     """)
 
 
