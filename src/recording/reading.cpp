@@ -88,7 +88,8 @@ Result<StampedTransform> Reading::lookup(std::string_view a, std::string_view b,
 Result<StampedTransform> Reading::lookup_at(std::string_view a, std::string_view b, Query query,
                                             Time at, Milliseconds wait) {
   query.at = at;
-  seek(instant_for(at));
+  const Time place = instant_for(at);
+  seek(place);
   Losses losses;
   while (true) {
     auto X_AB = lookup(a, b, query);
@@ -97,8 +98,10 @@ Result<StampedTransform> Reading::lookup_at(std::string_view a, std::string_view
     auto lost = losses.judge(*state_, unreachable ? state_->lost(a, b) : std::nullopt, now_, ends);
     if (lost) X_AB = tl::unexpected(*std::move(lost));
     if (X_AB || ends || !may_come(X_AB.error().code)) return X_AB;
-    const auto next = cursor_.peek();
-    if (!next || is_late(*next, at, wait) || step() == nullptr) return X_AB;
+    const RecordedMessage* next = cursor_.front();
+    if (next == nullptr || is_late(next->log, at, wait)) return X_AB;
+    if (ends_with(*next, a, b, place)) return X_AB;
+    (void)step();
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -59,10 +60,18 @@ class Reading {
   // How much is read before an instant, at first: as much as live histories have.
   static constexpr std::chrono::seconds kHistory{10};
 
+  // Partitions that are discovered within this time from the beginning on were there before.
+  static constexpr std::chrono::seconds kDiscovery{1};
+
   void load(Time at, std::chrono::nanoseconds span);
   void advance(Time at);
   // Whether there are keyframes between what is shown and what an instant needs.
   [[nodiscard]] bool skips_to(Time at) const;
+  // Whether the structure in which frames are looked up at a place ends with a message.
+  [[nodiscard]] bool ends_with(const RecordedMessage& next, std::string_view a, std::string_view b,
+                               Time place) const {
+    return state_->changes_path(next, a, b, std::max(place, begin_ + kDiscovery));
+  }
 
   Cursor cursor_;
   Time begin_;

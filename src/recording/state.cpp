@@ -304,6 +304,53 @@ Returned State::returned(const Lost& lost, Time now) const {
   return known.returned && now - *known.returned < kSameAfter ? Returned::kPerhaps : Returned::kYes;
 }
 
+// Whose parents decide how two frames are connected. Those that are missing for it are among them.
+std::unordered_set<std::string> State::path_frames(std::string_view a, std::string_view b) const {
+  std::unordered_set<std::string> frames;
+  if (const auto edges = forest_.edges(a, b)) {
+    for (const FrameInfo& edge : *edges) frames.insert(edge.id);
+    return frames;
+  }
+  for (const std::string_view end : {a, b}) {
+    for (std::string id(end); !id.empty() && frames.insert(id).second;) {
+      // One that was cut waits for those above it to move, but not for itself.
+      if (cut_.count(id) > 0) return {id};
+      const auto info = forest_.info(id);
+      id = info ? info->parent : std::string();
+    }
+  }
+  return frames;
+}
+
+bool State::changes_path(const RecordedMessage& message, std::string_view a, std::string_view b,
+                         Time known_by) const {
+  const auto* news = std::get_if<RecordedFrames>(&message.what);
+  if (news == nullptr) return false;
+  const auto found = partitions_.find(news->partition);
+  const Known* known = found != partitions_.end() ? &found->second : nullptr;
+  if (news->repeats && known != nullptr && known->has_state) return false;
+  const bool first = known == nullptr || known->incarnation == 0;
+  const bool was_there = first && (known != nullptr ? known->info.since : message.log) <= known_by;
+  const bool begins = news->complete && !(known && news->incarnation == known->incarnation);
+  const auto frames = path_frames(a, b);
+  std::unordered_set<std::string_view> stay;
+  for (const WatchedFrame& frame : news->frames) {
+    stay.insert(frame.id);
+    if (frames.count(frame.id) == 0) continue;
+    const std::string owner = this->owner(frame.id);
+    if (owner.empty() && was_there) continue;
+    if (owner != news->partition || begins || known->frames.at(frame.id) != frame.parent) {
+      return true;
+    }
+  }
+  const std::unordered_set<std::string_view> removed(news->removed.begin(), news->removed.end());
+  const auto goes = [&](const std::string& id) {
+    const bool is_left_out = news->complete && stay.count(id) == 0;
+    return (is_left_out || removed.count(id) > 0) && owner(id) == news->partition;
+  };
+  return std::any_of(frames.begin(), frames.end(), goes);
+}
+
 // As the owners answered and the caller put it together, because to fourth order that matters.
 Result<StampedTransform> State::lookup(std::string_view a, std::string_view b,
                                        const Query& query) const {

@@ -54,6 +54,13 @@ class State {
   /// The first owner on the path that is not reachable.
   [[nodiscard]] std::optional<Lost> lost(std::string_view a, std::string_view b) const;
   [[nodiscard]] Returned returned(const Lost& lost, Time now) const;
+  /// Whether a message that comes next changes how two frames are connected, or are not: what is
+  /// known after it says nothing of the structure before. Not so the first frames of a partition
+  /// that was reachable before, nor the move for which a frame waits. O(depth), and the size of the
+  /// message.
+  /// @param known_by  from when on the partition must have been reachable, at most
+  [[nodiscard]] bool changes_path(const RecordedMessage& message, std::string_view a,
+                                  std::string_view b, Time known_by) const;
   /// The runs of edges of one owner, of a path that begins here.
   [[nodiscard]] std::vector<PathSegment> segments(const std::vector<FrameInfo>& edges,
                                                   std::string_view from) const;
@@ -92,6 +99,8 @@ class State {
   void mend();
   [[nodiscard]] std::optional<Lost> lost(const std::vector<FrameInfo>& edges) const;
   void drop(Known& known, const std::string& id);
+  [[nodiscard]] std::unordered_set<std::string> path_frames(std::string_view a,
+                                                            std::string_view b) const;
   void share_memory();
   // The frame's handle if the edge is one of the partition, and has a value.
   [[nodiscard]] std::optional<Handle> settled(const Known& known, const RecordedEdge& edge) const;

@@ -42,7 +42,7 @@ class Reading::Instants {
       if (std::exchange(looked, done_) != done_ && reading_.skips_to(place())) go_to_next();
       const RecordedMessage* message = reading_.cursor_.front();
       if (message == nullptr) {
-        (void)answer(std::nullopt);
+        (void)answer(std::nullopt, nullptr);
       } else {
         pass(*message);
       }
@@ -74,17 +74,18 @@ class Reading::Instants {
     const bool appends = appends_.only_appends(*reading_.state_, message);
     const bool answers = !appends || ++passed_ > kAtOnce || is_late(log, place(), wait_);
     // The answer may have read another place.
-    if (answers && !answer(log)) return begin();
+    if (answers && !answer(log, &message)) return begin();
     if (answers) passed_ = 0;
     (void)reading_.step();
     if (appends) return;
     begin();
-    if (!answer(log)) begin();
+    if (!answer(log, nullptr)) begin();
   }
 
   // Answers what can be answered now, of what was asked before the next message; at the end, all.
+  // @param coming  that message, if it has not come yet: its structure is not that of the instants
   // @return whether the state is still the same
-  [[nodiscard]] bool answer(std::optional<Time> next_message) {
+  [[nodiscard]] bool answer(std::optional<Time> next_message, const RecordedMessage* coming) {
     const State* const state = reading_.state_.get();
     handles_.reset();
     for (; done_ < order_.size() && (!next_message || place() < *next_message); ++done_) {
@@ -94,10 +95,17 @@ class Reading::Instants {
       find_handles(X_AB.has_value());
       const bool reads_on =
           !X_AB && may_come(X_AB.error().code) && X_AB.error().code != Errc::kUnreachable;
-      if (reads_on && next_message && !is_late(*next_message, place(), wait_)) break;
+      const bool goes_on = next_message && !is_late(*next_message, place(), wait_);
+      if (reads_on && goes_on && !ends_with(coming)) break;
       answers_.add(order_[done_], X_AB);
     }
     return state == reading_.state_.get();
+  }
+
+  // What was looked up may have read another place, where another message is next.
+  [[nodiscard]] bool ends_with(const RecordedMessage* coming) {
+    if (coming == nullptr || reading_.cursor_.front() != coming) return false;
+    return reading_.ends_with(*coming, a_, b_, place());
   }
 
   // All edges have values, and are of one forest: so the handles are enough.

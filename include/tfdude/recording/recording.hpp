@@ -93,7 +93,8 @@ class TFDUDE_EXPORT Recording {
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query = {});
   /// X_AB at a stamp, as Client::lookup() with a wait answered it when it was asked at
-  /// instant_for() it: goes there, and then on until all edges have their data.
+  /// instant_for() it: goes there, and then on until all edges have their data, but not beyond a
+  /// change of the structure between the frames.
   /// @param wait  how long, of the time of the recording
   [[nodiscard]] Result<StampedTransform> lookup_at(std::string_view a, std::string_view b, Time at,
                                                    const Query& query = {},

@@ -30,6 +30,14 @@ WatchedValue fixed(std::uint32_t frame, double x) {
           Covariance()};
 }
 
+// One of an instant, which is 1 m less than its time.
+WatchedValue sample(std::uint32_t frame, double t, bool begins = false) {
+  WatchedValue value = fixed(frame, t - 1);
+  value.stamp = at(t);
+  if (!begins) value.begins.reset();
+  return value;
+}
+
 // A file, of a partition "root" with the frame "world", and others.
 class Film {
  public:
@@ -157,4 +165,82 @@ TEST_CASE("recording: frames of two owners change places, and the second one is 
     CHECK(then(recording, "a", t + 3) == again);
     CHECK(then(recording, "b", t + 3) == "3.000000");
   }
+}
+
+TEST_CASE(
+    "recording: a frame that waits for another one to move is not looked up in a later place") {
+  Film film;
+  film.add("A", {{"a", "b"}}, 1);
+  film.set("A", {fixed(0, 10)}, 1);
+  film.add("B", {{"b", "world"}}, 1);
+  film.set("B", {fixed(0, 1)}, 1);
+  // What A did is not in the file.
+  film.add("B", {{"b", "a"}}, 3);
+  film.set("B", {fixed(0, 2)}, 3.01);
+  film.add("B", {{"b", "world"}}, 5);
+  film.set("B", {fixed(0, 3)}, 5.01);
+  Recording recording = film.watched();
+  for (const char* frame : {"a", "b"}) {
+    CAPTURE(frame);
+    CHECK(then(recording, frame, 4) == "not_connected");
+  }
+  CHECK(then(recording, "b", 6) == "3.000000");
+  CHECK(then(recording, "a", 6) == "13.000000");
+}
+
+TEST_CASE("recording: a lookup reads on for samples, in the structure of its instant") {
+  Film film;
+  film.add("A", {{"hand", "world"}, {"head", "world"}}, 1);
+  film.set("A", {fixed(0, 1), sample(1, 1, true)}, 1);
+  film.set("A", {sample(1, 2)}, 2.01);
+  film.set("A", {sample(1, 4)}, 4.01);
+  // The hand is removed, and added elsewhere; the head is moved to a neck, and the eye is new.
+  film.add("A", {{"head", "world"}}, 5);
+  film.add("A", {{"head", "neck"}, {"neck", "world"}}, 7);
+  film.set("A", {fixed(0, 100), fixed(1, 100)}, 7.01);
+  film.add("A", {{"eye", "head"}, {"head", "neck"}, {"neck", "world"}}, 8);
+  film.set("A", {fixed(0, 1000)}, 8.01);
+  film.add("B", {{"hand", "world"}}, 8.5);
+  film.set("B", {fixed(0, 500)}, 8.51);
+  Recording recording = film.watched();
+  CHECK(then(recording, "hand", 4) == "1.000000");
+  CHECK(then(recording, "hand", 6) == "unknown_end");
+  CHECK(then(recording, "hand", 8.4) == "unknown_end");
+  CHECK(then(recording, "hand", 9) == "500.000000");
+  CHECK(then(recording, "head", 3) == "2.000000");
+  CHECK(then(recording, "head", 4.5) == "not_yet");
+  CHECK(then(recording, "head", 7.5) == "200.000000");
+  CHECK(then(recording, "eye", 7.5) == "unknown_end");
+  CHECK(then(recording, "eye", 9) == "1200.000000");
+  // Each of many instants as it is alone.
+  const Trajectory all = recording.trajectory("world", "hand", {at(4), at(6), at(8.4), at(9)});
+  CHECK(said(all, 0) == "1.000000");
+  CHECK(said(all, 1) == "unknown_end");
+  CHECK(said(all, 2) == "unknown_end");
+  CHECK(said(all, 3) == "500.000000");
+  const Trajectory heads = recording.trajectory("world", "head", {at(7.5), at(3), at(4.5)});
+  CHECK(said(heads, 0) == "200.000000");
+  CHECK(said(heads, 1) == "2.000000");
+  CHECK(said(heads, 2) == "not_yet");
+}
+
+TEST_CASE("recording: the first frames of a partition were there since it was reachable") {
+  Film film;
+  film.reach("slow", 1.5);
+  film.reach("later", 5);
+  film.add("slow", {{"arm", "world"}}, 6);
+  film.set("slow", {fixed(0, 1)}, 6.01);
+  film.add("later", {{"leg", "world"}}, 7);
+  film.set("later", {fixed(0, 2)}, 7.01);
+  Recording recording = film.watched();
+  // The recording had just begun to discover them.
+  CHECK(then(recording, "arm", 1.01) == "1.000000");
+  CHECK(then(recording, "arm", 4) == "1.000000");
+  CHECK(then(recording, "leg", 1.01) == "unknown_end");
+  CHECK(then(recording, "leg", 4.9) == "unknown_end");
+  CHECK(then(recording, "leg", 5.1) == "2.000000");
+  const Trajectory all = recording.trajectory("world", "leg", {at(4.9), at(5.1), at(8)});
+  CHECK(said(all, 0) == "unknown_end");
+  CHECK(said(all, 1) == "2.000000");
+  CHECK(said(all, 2) == "2.000000");
 }
