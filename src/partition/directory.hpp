@@ -342,8 +342,9 @@ class Directory {
   [[nodiscard]] bool has_frames(Owner owner) const;
   [[nodiscard]] std::vector<Owner> movers_of(const JointUse& use) const;
   [[nodiscard]] Result<JointRoute> route_joint_of(Owner owner, const std::string& name) const;
-  [[nodiscard]] std::string named_by_partition(const std::string& joint,
-                                               const std::vector<Owner>& owners) const;
+  [[nodiscard]] static std::optional<Owner> mimicker_of(const JointUse& use);
+  [[nodiscard]] std::string contested_text(const std::string& joint, const JointUse& use,
+                                           const std::vector<Owner>& owners) const;
   void report_contested(const std::string& joint);
   void replace_joints(KeptPage& kept, const std::vector<PageJoint>& joints, Owner owner);
   [[nodiscard]] static std::vector<Tombstone> new_tombstones(

@@ -76,9 +76,17 @@ std::vector<Owner> Directory::movers_of(const JointUse& use) const {
   return movers;
 }
 
-// "partitions 'arm' and 'base' have a joint 'elbow': say 'arm/elbow' or 'base/elbow'"
-std::string Directory::named_by_partition(const std::string& joint,
-                                          const std::vector<Owner>& owners) const {
+// With it moves a joint of its own that mimics one of these, of which it cannot be known.
+std::optional<Owner> Directory::mimicker_of(const JointUse& use) {
+  const auto other = std::find_if(use.others.begin(), use.others.end(),
+                                  [&](Owner owner) { return use.movers.count(owner) == 0; });
+  return other != use.others.end() ? std::optional(*other) : std::nullopt;
+}
+
+// "partitions 'arm' and 'base' have a joint 'elbow': say 'arm/elbow' or 'base/elbow'", unless that
+// would be rejected.
+std::string Directory::contested_text(const std::string& joint, const JointUse& use,
+                                      const std::vector<Owner>& owners) const {
   std::vector<std::string> names;
   names.reserve(owners.size());
   for (const Owner owner : owners) names.push_back(name(owner));
@@ -91,7 +99,11 @@ std::string Directory::named_by_partition(const std::string& joint,
     partitions += (i > 0 && last ? " and " : comma) + quote(names[i]);
     scoped += (i > 0 && last ? " or " : comma) + quote(names[i] + "/" + joint);
   }
-  return "partitions " + partitions + " have a joint " + quote(joint) + ": say " + scoped;
+  const std::string contested = "partitions " + partitions + " have a joint " + quote(joint);
+  const auto mimicker = mimicker_of(use);
+  if (!mimicker) return contested + ": say " + scoped;
+  return contested + ", and a joint of " + quote(name(*mimicker)) +
+         " mimics one of them: give them different names";
 }
 
 // Each pair of partitions once, until the conflict has ended.
@@ -111,7 +123,7 @@ void Directory::report_contested(const std::string& joint) {
   Change change{ChangeKind::kJointConflict, name(movers[0]), {}, {}, name(movers[1]), {}, {}};
   if (change.rival < change.partition) std::swap(change.partition, change.rival);
   change.joint = joint;
-  change.message = named_by_partition(joint, movers);
+  change.message = contested_text(joint, use->second, movers);
   changes_.add(std::move(change));
 }
 
@@ -119,7 +131,7 @@ Result<Directory::JointRoute> Directory::route_joint(const std::string& name) co
   if (const auto known = joints_.find(name); known != joints_.end()) {
     const JointUse& use = known->second;
     if (const auto movers = movers_of(use); movers.size() > 1) {
-      return fail(Errc::kAmbiguousJoint, named_by_partition(name, movers));
+      return fail(Errc::kAmbiguousJoint, contested_text(name, use, movers));
     }
     std::multiset<Owner> all = use.movers;
     all.insert(use.others.begin(), use.others.end());
@@ -146,15 +158,12 @@ Result<Directory::JointRoute> Directory::route_joint_of(Owner owner,
   const JointUse& use = known->second;
   const auto movers = movers_of(use);
   JointRoute route{name, {owner}};
+  if (movers.size() > 1) {
+    if (!mimicker_of(use)) return route;
+    return fail(Errc::kAmbiguousJoint, contested_text(name, use, movers));
+  }
   for (const Owner other : distinct(use.others)) {
-    if (other == owner) continue;
-    if (movers.size() < 2) {
-      route.owners.push_back(other);
-    } else if (use.movers.count(other) == 0) {
-      return fail(Errc::kAmbiguousJoint, named_by_partition(name, movers) + ", and a joint of " +
-                                             quote(this->name(other)) +
-                                             " mimics one of them: give them different names");
-    }
+    if (other != owner) route.owners.push_back(other);
   }
   return route;
 }
