@@ -65,7 +65,8 @@ Result<void> JointCalls::publish(const JointUpdate& update) {
   auto sent = requests_.publish(*parts, deadline, share_of, [this](const JointUpdate& own) {
     return member_.apply(own).map([](std::size_t) {});
   });
-  return outcome ? sent : outcome;
+  if (outcome) return sent;
+  return tl::unexpected(requests_.last_word(std::move(outcome.error()), deadline));
 }
 
 Result<std::vector<JointInfo>> JointCalls::list(const std::string& partition,

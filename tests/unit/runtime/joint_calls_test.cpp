@@ -9,6 +9,7 @@
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
+#include "support/replica.hpp"
 #include "support/rig.hpp"
 
 namespace tfdude {
@@ -77,6 +78,21 @@ TEST_CASE("joints: an unknown joint is reported and the others are published") {
   CHECK(owner.node().joints("arm")->at(0).position == 0.25);
   CHECK(outcome(mover.calls.update({{{"knee", 1}, {"elbow", 0.75}}, {}})) == "unknown_joint");
   CHECK(owner.node().joints("arm")->at(0).position == 0.25);
+}
+
+TEST_CASE("joints: an unknown joint may be that of an owner that was lost before") {
+  LoopbackNetwork network;
+  ScriptedOwner owner(network, "arm", arm());
+  Mover mover(network);
+  Presence presence = testing::presence_of("body", 1, 0);
+  presence.absent = {{"leg", 0, Absent::Kind::kLost, 1}};
+  mover.on_presence(presence);
+  const JointUpdate update{{{"knee", 1}}, {}};
+  for (const auto& moved : {mover.calls.publish(update), mover.calls.update(update)}) {
+    CHECK(outcome(moved) == "unreachable");
+    CHECK_THAT(moved.error().message,
+               ContainsSubstring("no joint 'knee'; it may belong to partition 'leg'"));
+  }
 }
 
 TEST_CASE("joints: an unreachable owner is named and gets nothing") {
