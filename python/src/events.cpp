@@ -39,7 +39,7 @@ class Answering {
  public:
   Answering(MailboxPtr mailbox, std::uint64_t key) : mailbox_(std::move(mailbox)), key_(key) {}
   ~Answering() {
-    if (!answered_) answer(fail(Errc::kTimeout, "the client was closed"));
+    if (!answered_) answer(tl::unexpected(closed_error()));
   }
   Answering(const Answering&) = delete;
   Answering& operator=(const Answering&) = delete;

@@ -95,6 +95,8 @@ SharedFunction share(py::function function) {
   });
 }
 
+Error closed_error() { return {Errc::kTransport, "this client is closed"}; }
+
 Session::Session(std::shared_ptr<Client> client, Milliseconds timeout, std::string partition)
     : client_(std::move(client)), timeout_(timeout), partition_(std::move(partition)) {
   process().sessions.insert(this);
@@ -116,7 +118,7 @@ void Session::close() {
 
 std::shared_ptr<Client> Session::client() const {
   check_usable();
-  if (!client_) raise({Errc::kTransport, "this client is closed"});
+  if (!client_) raise(closed_error());
   return client_;
 }
 

@@ -53,6 +53,9 @@ void call_python(const py::function& function, const std::function<py::object()>
 using SharedFunction = std::shared_ptr<py::function>;
 [[nodiscard]] SharedFunction share(py::function function);
 
+/// What a call or a wait ends with once its client is closed.
+[[nodiscard]] Error closed_error();
+
 /// An open Client or Node, for the Python object of the same name. It can be closed while other
 /// threads call it; they finish first.
 class Session {

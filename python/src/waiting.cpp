@@ -38,7 +38,7 @@ Result<StampedTransform> wait_for_lookup(const Session& session, const std::stri
   const auto is_ready = [&] { return ready.wait_for(kLook) == std::future_status::ready; };
   while (!without_gil(is_ready)) {
     check_interrupted();
-    if (session.closed()) return fail(Errc::kTimeout, "the client was closed");
+    if (session.closed()) return tl::unexpected(closed_error());
   }
   return ready.get();
 }

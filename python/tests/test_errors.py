@@ -176,6 +176,29 @@ def test_waits_of_watches_end_with_the_client(network, node):
                 call()
 
 
+@pytest.mark.parametrize(
+    "wait",
+    [
+        lambda c: c.lookup("base", "never", timeout=20),
+        lambda c: c.lookup("base", "tool", c.now() + 10**12, timeout=20),
+        lambda c: c.lookup_full("base", c.now(), "never", c.now(), "base", timeout=20),
+        lambda c: c.lookup_many("base", ["never"], timeout=20),
+        lambda c: c.velocity("base", "never", timeout=20),
+        lambda c: c.watch("base", "never", timeout=20),
+        lambda c: c.watch_edges(["never"], timeout=20),
+        lambda c: c.transform_cloud("base", "tool", np.zeros((1, 3)), stamps=[c.now() + 10**12], timeout=20),
+        lambda c: c.joints("never", timeout=20),
+        lambda c: c.wait_until(c.now() + 10**12, 20),
+        lambda c: c.can_lookup("base", "never", timeout=20).error,
+    ],
+)
+def test_all_waits_end_with_one_code_once_the_client_is_closed(network, node, wait):
+    node.update("tool", Transform.exact((0, 0, 1)), node.now())
+    client = tfdude.Client(network=network)
+    error = ends_with_the_client(client, lambda: wait(client))
+    assert (error.code, str(error)) == ("transport", "this client is closed")
+
+
 def test_durations_of_get(client, node):
     short = datetime.timedelta(milliseconds=10)
     assert tfdude.MessageFilter(client, "base").get(short) is None

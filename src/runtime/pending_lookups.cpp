@@ -53,7 +53,7 @@ void PendingLookups::give_up(Lookup& lookup) {
     lookup.callback->close();
   } else {
     lookup.promise.set_value(fail(
-        Errc::kTimeout,
+        Errc::kTransport,
         "the lookup was cancelled, as its client is closed: " + lookup.waiting.last().message));
   }
 }
