@@ -35,8 +35,8 @@ class YamlFields {
                                             const std::string& message) const;
 
   /// Passes the root of the file's only document to `read`, and returns what that does.
-  /// @return also kConfig: not YAML, empty, or several documents; kTooMuch: aliases that repeat
-  ///   too much. So `read` may follow aliases without limits of its own.
+  /// @return also kConfig: not YAML, empty, several documents, or aliases that repeat too much. So
+  ///   `read` may follow aliases without limits of its own.
   [[nodiscard]] Result<void> read_document(
       const std::string& text, const std::function<Result<void>(const YAML::Node&)>& read) const;
 

@@ -44,11 +44,11 @@ class DocumentChecks final : public YAML::EventHandler {
     Extent of{0, found->second.nodes, found->second.depth};
     repeated_ += of.nodes;
     if (repeated_ > kMostRepeated) {
-      reject(mark, Errc::kTooMuch,
+      reject(mark, Errc::kConfig,
              "aliases repeat more than " + std::to_string(kMostRepeated) + " values");
     }
     if (open_.size() + of.depth > kDeepest) {
-      reject(mark, Errc::kTooMuch,
+      reject(mark, Errc::kConfig,
              "aliases nest more than " + std::to_string(kDeepest) + " levels");
     }
     // What is rejected needs no true size, which could exceed any number.

@@ -74,7 +74,7 @@ class TFDUDE_EXPORT Client {
   Client& operator=(Client&&) noexcept;
   /// Leaves the domain. After it has returned, no callback is running or will run, except a
   /// callback that calls it itself, which may go on without the Client. Cancels lookups that wait;
-  /// their futures get kTimeout. Waits for running callbacks, and at most Options::linger until
+  /// their futures get kTransport. Waits for running callbacks, and at most Options::linger until
   /// owners have acknowledged streamed values.
   ~Client();
 
