@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "math/bound_weights.hpp"
+#include "math/common_errors.hpp"
 
 namespace tfdude {
 namespace {
@@ -70,6 +71,26 @@ bool is_source_itself(std::string_view name, std::string_view said) {
 bool has_instants(const std::vector<CommonError>& common_errors) {
   return std::any_of(common_errors.begin(), common_errors.end(),
                      [](const CommonError& one) { return !said_source(one.source).empty(); });
+}
+
+bool join_instant(std::vector<CommonError>& common_errors, Time stamp) {
+  bool any = false;
+  for (CommonError& one : common_errors) {
+    if (!is_of_one_instant(one.source)) continue;
+    const std::string said(said_source(one.source));
+    if (one.source != instant_source(said, stamp)) continue;
+    const auto source = std::find_if(
+        common_errors.begin(), common_errors.end(),
+        [&](const CommonError& other) { return is_source_itself(other.source, said); });
+    if (source == common_errors.end()) continue;
+    one.source = source->source;
+    any = true;
+  }
+  if (!any) return false;
+  std::vector<CommonError> joined;
+  add_errors(common_errors, joined);
+  common_errors = std::move(joined);
+  return true;
 }
 
 bool allow_any_relation(std::vector<CommonError>& common_errors) {

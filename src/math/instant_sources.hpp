@@ -37,6 +37,9 @@ namespace tfdude {
 /// Whether any of them is the error of a source at some instants.
 [[nodiscard]] bool has_instants(const std::vector<CommonError>& common_errors);
 
+/// At an instant, its error of a source is the source's. @return whether there was one
+bool join_instant(std::vector<CommonError>& common_errors, Time stamp);
+
 /// Makes errors of a source, and of the same source at some instants, as large as suffices for any
 /// correlation of both. @return whether there were any
 bool allow_any_relation(std::vector<CommonError>& common_errors);

@@ -17,8 +17,12 @@ Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
 }
 
 StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> stamp) {
-  std::vector<CommonError> errors =
-      has_instants(X.common_errors) ? X.common_errors : std::vector<CommonError>();
+  std::vector<CommonError> errors;
+  if (has_instants(X.common_errors)) {
+    Belief here = X;
+    if (stamp && join_instant(here.common_errors, *stamp)) return collapsed(here, order, stamp);
+    errors = std::move(here.common_errors);
+  }
   const bool bounded = X.unknown || allow_any_relation(errors);
   StampedTransform found{collapse(X), stamp, {order, bounded, {}}};
   std::vector<std::string>& sources = found.basis.sources;

@@ -7,6 +7,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "math/instant_sources.hpp"
 #include "tree/edge_values.hpp"
 #include "tree/frames.hpp"
 #include "tree/path_lookup.hpp"
@@ -191,6 +192,7 @@ Result<void> compute_newest(const Ends& ends, Others& others, Value& X_AB) {
         // A bound depends on the order in which edges are added up. A basis would tell.
         if (newest && whole.unknown) return not_readable();
       }
+      if (met.moving) join_instant(whole.common_errors, time_of(met.limiting->stamp));
       X_AB = collapse(whole);
     }
   }

@@ -51,6 +51,16 @@ TEST_CASE("Long names of sources are told apart") {
   CHECK(instant_source(said_source(name), Time::max()) == name);
 }
 
+TEST_CASE("At its instant the error of a source is the source's") {
+  std::vector<CommonError> errors = {error("a", 3), error(instant_source("a", at(7)), -2),
+                                     error(instant_source("b", at(7)), 5)};
+  std::vector<CommonError> later = errors;
+  CHECK_FALSE(join_instant(later, at(8)));
+  CHECK(later == errors);
+  CHECK(join_instant(errors, at(7)));
+  CHECK(errors == std::vector<CommonError>{error("a", 1), error(instant_source("b", at(7)), 5)});
+}
+
 TEST_CASE("A source and its error at some instants may be correlated in any way") {
   const std::string then = instant_source("a", at(7));
   const std::string before = merged_source("observed:1", "a");
