@@ -35,7 +35,7 @@ struct Sides {
   Covariance of_instants;
 };
 
-bool is_zero(const Covariance& sigma) { return sigma.upper() == Covariance::Upper{}; }
+bool is_without_loading(const Covariance& sigma) { return sigma.upper() == Covariance::Upper{}; }
 
 }  // namespace
 
@@ -110,7 +110,7 @@ bool allow_any_relation(std::vector<CommonError>& common_errors) {
     each([](const CommonError& one, Covariance& side, bool) {
       side += Covariance::trusted(Matrix6d(one.loading * one.loading.transpose()));
     });
-    if (is_zero(sides.itself) || is_zero(sides.of_instants)) continue;
+    if (is_without_loading(sides.itself) || is_without_loading(sides.of_instants)) continue;
     const BoundWeights weights = bound_weights(sides.itself, sides.of_instants);
     each([&](CommonError& one, Covariance&, bool itself) {
       one.loading *= std::sqrt(itself ? weights.of_A : weights.of_B);
@@ -133,7 +133,8 @@ Covariance sum_of_sources(const std::vector<OfSource>& parts, bool& bounded) {
       (itself ? sides.itself : sides.of_instants) += parts[i].second;
       taken[i] = true;
     }
-    bounded = bounded || !(is_zero(sides.itself) || is_zero(sides.of_instants));
+    bounded =
+        bounded || !(is_without_loading(sides.itself) || is_without_loading(sides.of_instants));
     sum += bound(sides.itself, sides.of_instants);
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
