@@ -203,8 +203,9 @@ def test_close_ends_a_wait(network, client):
     other = tfdude.Client(network=network)
     closer = threading.Timer(0.1, other.close)
     closer.start()
-    with pytest.raises(tfdude.TimeoutException, match="closed"):
+    with pytest.raises(tfdude.TransformException, match="closed") as raised:
         other.lookup("base", "nowhere", timeout=float("inf"))
+    assert raised.value.code == "transport"
     closer.join()
 
 
