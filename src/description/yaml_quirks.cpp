@@ -22,13 +22,12 @@ class DocumentChecks final : public YAML::EventHandler {
  public:
   struct Fault {
     YAML::Mark mark;
-    Errc code;
     std::string what;
   };
   [[nodiscard]] const std::optional<Fault>& fault() const { return fault_; }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (++documents_ == 2) reject(mark, Errc::kConfig, "holds more than one YAML document");
+    if (++documents_ == 2) reject(mark, "holds more than one YAML document");
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& /*mark*/, YAML::anchor_t anchor) override { end({anchor, 1, 1}); }
@@ -39,17 +38,15 @@ class DocumentChecks final : public YAML::EventHandler {
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchored_.find(anchor);
     if (found == anchored_.end()) {
-      return reject(mark, Errc::kConfig, "an alias stands for what it is in");
+      return reject(mark, "an alias stands for what it is in");
     }
     Extent of{0, found->second.nodes, found->second.depth};
     repeated_ += of.nodes;
     if (repeated_ > kMostRepeated) {
-      reject(mark, Errc::kConfig,
-             "aliases repeat more than " + std::to_string(kMostRepeated) + " values");
+      reject(mark, "aliases repeat more than " + std::to_string(kMostRepeated) + " values");
     }
     if (open_.size() + of.depth > kDeepest) {
-      reject(mark, Errc::kConfig,
-             "aliases nest more than " + std::to_string(kDeepest) + " levels");
+      reject(mark, "aliases nest more than " + std::to_string(kDeepest) + " levels");
     }
     // What is rejected needs no true size, which could exceed any number.
     if (fault_) of = {0, 1, 1};
@@ -87,8 +84,8 @@ class DocumentChecks final : public YAML::EventHandler {
     open_.back().depth = std::max(open_.back().depth, node.depth + 1);
   }
 
-  void reject(const YAML::Mark& mark, Errc code, std::string what) {
-    if (!fault_) fault_ = Fault{mark, code, std::move(what)};
+  void reject(const YAML::Mark& mark, std::string what) {
+    if (!fault_) fault_ = Fault{mark, std::move(what)};
   }
 
   int documents_ = 0;
@@ -133,8 +130,8 @@ Result<void> check_documents(const std::string& name, const std::string& text) {
   DocumentChecks checks;
   (void)(parser.HandleNextDocument(checks) && parser.HandleNextDocument(checks));
   if (!checks.fault()) return {};
-  const auto& [mark, code, what] = *checks.fault();
-  return fail(code, name + ":" + std::to_string(mark.line + 1) + ": " + what);
+  const auto& [mark, what] = *checks.fault();
+  return fail(Errc::kConfig, name + ":" + std::to_string(mark.line + 1) + ": " + what);
 }
 
 }  // namespace tfdude

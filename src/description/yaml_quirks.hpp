@@ -23,7 +23,7 @@ namespace tfdude {
 /// Rejects a second document, and aliases that would make a reader work without end: one that
 /// stands for what it is in, and those that repeat, or nest, more than a file of people does.
 /// Afterwards, a reader may follow aliases as if they were written out. Linear in the text.
-/// @return kConfig naming the file and line, kTooMuch; throws YAML::Exception if it is not YAML
+/// @return kConfig naming the file and line; throws YAML::Exception if it is not YAML
 [[nodiscard]] Result<void> check_documents(const std::string& name, const std::string& text);
 
 }  // namespace tfdude

@@ -5,6 +5,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/shares.hpp"
+
 namespace tfdude {
 namespace {
 
@@ -58,24 +60,10 @@ Result<std::optional<std::vector<HandedEdge>>> AdoptedParts::add(const PeerId& f
   return all;
 }
 
-std::size_t AdoptedParts::count(const PeerId& from) const {
-  return static_cast<std::size_t>(std::count_if(
-      begun_.begin(), begun_.end(), [&](const auto& one) { return one.first.first == from; }));
-}
-
 Result<void> AdoptedParts::make_room(const PeerId& from, const std::string& top) {
-  if (begun_.size() < kMost) return {};
-  auto least = begun_.end();
-  for (auto one = begun_.begin(); one != begun_.end(); ++one) {
-    const bool more = count(one->first.first) > 1;
-    if (more && (least == begun_.end() || one->second.heard < least->second.heard)) least = one;
-  }
-  if (count(from) > 0 || least == begun_.end()) {
-    return fail(Errc::kTooMuch, "frame " + quote(top) + ": " + std::to_string(kMost) +
-                                    " others are being handed over to this partition, the limit");
-  }
-  begun_.erase(least);
-  return {};
+  if (make_room_for(begun_, from, kMost)) return {};
+  return fail(Errc::kTooMuch, "frame " + quote(top) + ": " + std::to_string(kMost) +
+                                  " others are being handed over to this partition, the limit");
 }
 
 Result<void> AdoptedParts::put(Begun& begun, const std::string& top, const HandedPart& part) const {

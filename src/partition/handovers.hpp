@@ -105,7 +105,6 @@ class AdoptedParts {
     Time heard{};
   };
 
-  [[nodiscard]] std::size_t count(const PeerId& from) const;
   [[nodiscard]] Result<void> make_room(const PeerId& from, const std::string& top);
   [[nodiscard]] Result<void> put(Begun& begun, const std::string& top,
                                  const HandedPart& part) const;

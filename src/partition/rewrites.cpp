@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "partition/shares.hpp"
+
 namespace tfdude {
 
 Result<std::optional<std::vector<EdgeSample>>> Rewrites::add(const PeerId& from,
@@ -41,29 +43,15 @@ Result<std::optional<std::vector<EdgeSample>>> Rewrites::add(const PeerId& from,
       "frame " + quote(id) + ": its owner does not have all parts of its rewrite (any more)");
 }
 
-std::size_t Rewrites::count(const PeerId& from) const {
-  return static_cast<std::size_t>(std::count_if(
-      begun_.begin(), begun_.end(), [&](const auto& one) { return one.first.first == from; }));
-}
-
 Result<void> Rewrites::make_room(const PeerId& from, const std::string& id) {
-  if (count(from) >= kMostOfOne) {
+  if (count_of(begun_, from) >= kMostOfOne) {
     return fail(Errc::kTooMuch, "frame " + quote(id) + ": this participant has begun " +
                                     std::to_string(kMostOfOne) +
                                     " other rewrites here, its share of the limit");
   }
-  if (begun_.size() < kMost) return {};
-  auto least = begun_.end();
-  for (auto one = begun_.begin(); one != begun_.end(); ++one) {
-    const bool more = count(one->first.first) > 1;
-    if (more && (least == begun_.end() || one->second.heard < least->second.heard)) least = one;
-  }
-  if (count(from) > 0 || least == begun_.end()) {
-    return fail(Errc::kTooMuch, "frame " + quote(id) + ": " + std::to_string(kMost) +
-                                    " others are being rewritten, the limit");
-  }
-  begun_.erase(least);
-  return {};
+  if (make_room_for(begun_, from, kMost)) return {};
+  return fail(Errc::kTooMuch, "frame " + quote(id) + ": " + std::to_string(kMost) +
+                                  " others are being rewritten, the limit");
 }
 
 // Also that no more is kept than there may be in all.

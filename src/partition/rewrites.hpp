@@ -52,7 +52,6 @@ class Rewrites {
 
   using Key = std::pair<PeerId, std::uint64_t>;  // the sender and its number
 
-  [[nodiscard]] std::size_t count(const PeerId& from) const;
   [[nodiscard]] Result<void> make_room(const PeerId& from, const std::string& id);
   [[nodiscard]] static bool fits(const Begun& begun, const std::string& id,
                                  const RewriteRequest& part);
