@@ -319,11 +319,11 @@ std::size_t Process::open_calls() const {
   return static_cast<std::size_t>(open) + waiting_.size();
 }
 
-std::vector<std::string> Process::structure(const std::set<std::string>& except) const {
+std::vector<std::string> Process::structure(const Counts& counts) const {
   std::vector<std::string> lines;
   for (const FrameInfo& frame : forest_.frames()) {
     const std::string& owner = directory_.name(frame.owner);
-    if (!directory_.reachable(frame.owner) || except.count(owner) > 0) continue;
+    if (!directory_.reachable(frame.owner) || !counts(frame.id, owner)) continue;
     lines.push_back(frame.id + " < " + frame.parent + " @ " + owner);
   }
   std::sort(lines.begin(), lines.end());

@@ -173,9 +173,10 @@ class Process : public std::enable_shared_from_this<Process>,
   [[nodiscard]] std::size_t open_calls() const;
   [[nodiscard]] const std::set<std::uint64_t>& pushed_groups() const { return pushed_groups_; }
   [[nodiscard]] const Watches& watches() const { return watches_; }
-  /// id, parent and partition of each frame whose owner is reachable; sorted.
-  /// @param except  partitions that are left out
-  [[nodiscard]] std::vector<std::string> structure(const std::set<std::string>& except) const;
+  /// Whether a frame of that partition counts.
+  using Counts = std::function<bool(const std::string& frame, const std::string& owner)>;
+  /// id, parent and partition of each frame that counts and whose owner is reachable; sorted.
+  [[nodiscard]] std::vector<std::string> structure(const Counts& counts) const;
 
  private:
   struct Peer {

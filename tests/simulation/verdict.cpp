@@ -57,7 +57,7 @@ void Verdict::check() {
     if (hears_all(author->process())) authors.push_back(author.get());
   }
   for (Author* author : authors) all.push_back(&author->process());
-  const auto expected = all.back()->structure(cannot_return());
+  const auto expected = structure_of(*all.back());
   for (Process* one : all) check_replica(*one, expected);
   for (Process* one : all) {
     for (const std::string& partition : forgotten()) check_forgotten(*one, partition);
@@ -179,7 +179,7 @@ void Verdict::check_replica(Process& one, const std::vector<std::string>& expect
   if (!one.partition().empty() && !one.serves()) {
     violation("a daemon does not serve", who);
   }
-  const auto seen = one.structure(cannot_return());
+  const auto seen = structure_of(one);
   if (seen != expected) violation("replicas differ", who + " sees " + difference(seen, expected));
   if (!one.member().pending_yields().empty()) violation("a yield is pending", who);
   for (const auto& daemon : cast_.daemons) {
@@ -206,6 +206,21 @@ std::set<std::string> Verdict::cannot_return() const {
     if (cast_.authors.front()->world().forgotten.count(name) > 0) names.insert(name);
   }
   return names;
+}
+
+// With a full disk an owner publishes no page any more: a frame that it has handed over stays on
+// the last one. Who has not heard of the new owner, which may be gone, takes that for true.
+bool Verdict::cannot_withdraw(const std::string& frame, const std::string& owner) const {
+  const Process* daemon = cast_.find_daemon(owner);
+  if (daemon == nullptr || cast_.standing(owner) != Cast::Standing::kAside) return false;
+  return !daemon->forest().holds(frame);
+}
+
+std::vector<std::string> Verdict::structure_of(const Process& one) const {
+  const auto out = cannot_return();
+  return one.structure([&](const std::string& frame, const std::string& owner) {
+    return out.count(owner) == 0 && !cannot_withdraw(frame, owner);
+  });
 }
 
 // Those that were forgotten after their last process was heard.
@@ -331,10 +346,12 @@ void Verdict::check_owners(Process& one) {
   }
 }
 
-// What a deputy has removed does not return with the former owner.
+// What a deputy has removed does not return with the former owner, unless that one was forgotten:
+// it joins as a new one.
 void Verdict::check_handed(Process& one) {
-  const bool removed = cast_.authors.front()->world().handed_removed;
-  if (!removed || !plan_.deputizes_in_peace()) return;
+  const auto& world = cast_.authors.front()->world();
+  const bool forgotten = world.forgotten.count(faults::partition_name(cast_.wild)) != 0;
+  if (!world.handed_removed || !plan_.deputizes_in_peace() || forgotten) return;
   calls_.count("a deputy's removal was checked", 1);
   if (one.forest().exists(kHanded)) violation("a removed frame is back", kHanded);
 }

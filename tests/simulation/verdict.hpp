@@ -35,6 +35,8 @@ class Verdict {
   void violation(const std::string& kind, const std::string& what);
   [[nodiscard]] std::vector<std::string> forgotten() const;
   [[nodiscard]] std::set<std::string> cannot_return() const;
+  [[nodiscard]] bool cannot_withdraw(const std::string& frame, const std::string& owner) const;
+  [[nodiscard]] std::vector<std::string> structure_of(const Process& one) const;
   [[nodiscard]] bool passes_over_one(Process& client) const;
   [[nodiscard]] bool lacks_one(Process& client) const;
   [[nodiscard]] bool is_told_by_one(const std::string& partition) const;
