@@ -95,6 +95,9 @@ class Forest::Impl {
   [[nodiscard]] Result<std::int64_t> stamp_for(const HeldVersion* const* edges, std::size_t count,
                                                const std::optional<Time>& given)
       TFDUDE_REQUIRES(mutex_);
+  /// That of the newest sample of edges whose history does not restart now; kAlways: of none.
+  [[nodiscard]] static std::int64_t newest_that_stays(const HeldVersion* const* edges,
+                                                      std::size_t count, std::int64_t now);
   [[nodiscard]] const EdgeTiming& timing_of(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr ? edge.samples->timing() : default_timing_;
   }

@@ -68,7 +68,18 @@ Result<std::int64_t> Forest::Impl::stamp_for(const HeldVersion* const* edges, st
   if (!now) return no_time(*edges[0]);
   // If the clock stands still or was set back, the newest samples are replaced: stamps that are
   // made up must not tell a velocity.
-  return std::max(*now, newest);
+  return newest <= *now ? *now : std::max(*now, newest_that_stays(edges, count, *now));
+}
+
+std::int64_t Forest::Impl::newest_that_stays(const HeldVersion* const* edges, std::size_t count,
+                                             std::int64_t now) {
+  std::int64_t newest = kAlways;
+  for (std::size_t i = 0; i < count; ++i) {
+    const HeldVersion& edge = *edges[i];
+    if (edge.left_behind() || history_restarts(edge, now)) continue;
+    newest = std::max(newest, edge.stamp);
+  }
+  return newest;
 }
 
 Result<void> Forest::Impl::check_ahead(const HeldVersion& edge, std::int64_t stamp) {

@@ -38,6 +38,12 @@ bool starts_again(const HeldVersion& newest, std::int64_t stamp) {
 
 }  // namespace
 
+bool history_restarts(const HeldVersion& newest, std::int64_t stamp) {
+  if (!newest.limits() || newest.left_behind()) return false;
+  return stamp < newest.stamp - newest.samples->timing().span.count() &&
+         starts_again(newest, stamp);
+}
+
 Result<void> check_late_sample(const HeldVersion& newest, std::int64_t stamp) {
   if (newest.left_behind()) return {};  // it begins another history
   const SampleHistory& samples = *newest.samples;

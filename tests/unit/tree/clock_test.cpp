@@ -108,6 +108,44 @@ TEST_CASE("clock: while it stands still, unstamped updates are one sample, with 
   CHECK(outcome(sim.forest.update("arm", along_x(1), ms(17))) == "stamp_taken");
 }
 
+TEST_CASE("clock: one that was far ahead does not keep the values behind that follow") {
+  Simulated sim;
+  std::vector<std::string> restarted;
+  sim.forest.on_restart([&](const HistoryRestart& one) { restarted.push_back(one.id); });
+  const auto newest = [&] { return sim.forest.histories("arm").at(0).newest; };
+  sim.now = ms(3'600'000);
+  REQUIRE(sim.forest.update({{"arm", along_x(1)}, {"mast", along_x(1)}}));
+  // A little behind: the sample is replaced until the clock has caught up.
+  for (int i = 0; i < 10; ++i) {
+    sim.now = ms(3'595'000 + i);
+    REQUIRE(sim.forest.update("arm", along_x(2)));
+  }
+  CHECK(newest() == ms(3'600'000));
+  // By more than is kept: also replaced, until five in a row were there at times that grow.
+  for (int i = 0; i < 4; ++i) {
+    sim.now = ms(1000 + i);
+    REQUIRE(sim.forest.update({{"arm", along_x(3)}, {"mast", along_x(4)}}));
+  }
+  REQUIRE(sim.forest.update({{"arm", along_x(3)}, {"mast", along_x(4)}}));
+  CHECK(newest() == ms(3'600'000));
+  CHECK(restarted.empty());
+  sim.now = ms(1004);
+  REQUIRE(sim.forest.update({{"arm", along_x(5)}, {"mast", along_x(6)}}));
+  CHECK(newest() == ms(1004));
+  CHECK(sim.forest.histories("arm").at(0).samples == 1);
+  CHECK(restarted == std::vector<std::string>{"arm", "mast"});
+  CHECK(x_of(sim.forest.lookup("world", "arm", at(1004))) == 5);
+  // A sample that goes on ends the row.
+  sim.now = ms(61'000);
+  REQUIRE(sim.forest.update("arm", along_x(1)));
+  for (int i = 0; i < 8; ++i) {
+    sim.now = ms(2000 + i);
+    REQUIRE(sim.forest.update("arm", along_x(7)));
+    REQUIRE(sim.forest.update("arm", along_x(8), ms(60'000 + i)));
+  }
+  CHECK(newest() == ms(61'000));
+}
+
 TEST_CASE("clock: samples tell a velocity again when two in a row have had stamps") {
   Simulated sim;
   sim.now = ms(100);
