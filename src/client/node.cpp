@@ -33,11 +33,9 @@ Result<Node> Node::open(TransportPtr transport, const std::string& partition,
 
 std::size_t Node::own_frames() const { return participant_->queries().own_frames(); }
 
-Result<void> Node::clear_history(const std::string& id) {
-  return participant_->forest().clear_history(id);
-}
+Result<void> Node::clear_history(const std::string& id) { return participant_->clear_history(id); }
 
-std::size_t Node::clear_history() { return participant_->forest().clear_histories(Time::min()); }
+std::size_t Node::clear_history() { return participant_->clear_histories(Time::min()); }
 
 Result<void> Node::set_timing(const std::string& id, const EdgeTiming& timing) {
   return participant_->forest().set_timing(id, timing);

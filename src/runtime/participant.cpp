@@ -109,11 +109,21 @@ Result<void> Participant::serve(const std::vector<FrameSpec>& frames) {
   return served;
 }
 
+Result<void> Participant::clear_history(const std::string& id) {
+  watch_server_.keep_pending();
+  return forest().clear_history(id);
+}
+
+std::size_t Participant::clear_histories(Time from, std::optional<Time> jumped_from) {
+  watch_server_.keep_pending();
+  return forest().clear_histories(from, jumped_from);
+}
+
 Result<void> Participant::set_time(Time now, bool by_itself) {
   const auto before = structure_.clock.set(now);
   if (!before) return tl::unexpected(before.error());
   if (!*before) return {};
-  const std::size_t cleared = structure_.forest.clear_histories(now, *before);
+  const std::size_t cleared = clear_histories(now, *before);
   // Two publishers of the time would fill the log.
   const std::uint64_t jumps = ++jumps_;
   if (is_logged(jumps)) {

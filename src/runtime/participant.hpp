@@ -73,6 +73,9 @@ class Participant final : public TransportHandler,
   /// @return kInvalidInput in a client that follows only some frames
   [[nodiscard]] Result<Streams*> streams();
 
+  /// As Forest::clear_history() and clear_histories(); watchers get the samples of before.
+  [[nodiscard]] Result<void> clear_history(const std::string& id);
+  std::size_t clear_histories(Time from, std::optional<Time> jumped_from = std::nullopt);
   /// Sets the external clock. If it jumps back, own values that are later do not hold any more.
   /// @return kInvalidInput
   /// @param by_itself  the process has determined the time, and not another one

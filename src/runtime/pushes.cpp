@@ -107,6 +107,16 @@ void Pushes::tell_all(std::uint64_t group) {
   sink_.wake();
 }
 
+void Pushes::keep_pending() {
+  const Lock lock(mutex_);
+  for (auto& [id, group] : groups_) {
+    const bool all = group.watched.request().period == Milliseconds(0);
+    if (!all || pending_.size() >= kMostPending) continue;
+    PushedValues pushed = group.watched.next_push(forest_);
+    if (!pushed.entries.empty()) pending_.push_back(std::move(pushed));
+  }
+}
+
 // The thread reports the end, as it may still be pushing to the group.
 void Pushes::end(std::map<std::uint64_t, Group>::iterator& group) {
   ended_.push_back(group->first);
@@ -117,8 +127,8 @@ void Pushes::end(std::map<std::uint64_t, Group>::iterator& group) {
 
 std::vector<PushedValues> Pushes::take_due(Clock::time_point now, std::vector<std::uint64_t>& ended,
                                            Clock::time_point& next) {
-  std::vector<PushedValues> due;
   const Lock lock(mutex_);
+  std::vector<PushedValues> due = std::exchange(pending_, {});
   for (auto group = groups_.begin(); group != groups_.end();) {
     if (now >= group->second.lease) {
       end(group);

@@ -41,6 +41,8 @@ class Pushes {
   /// DDS writer for each, which all participants discover. It may have half of all groups.
   static constexpr double kNewAtOnce = 128;
   static constexpr double kNewPerSecond = 20;
+  /// Pushes that wait, as far as keep_pending() has made them.
+  static constexpr std::size_t kMostPending = 1024;
   /// Edges of all groups together: each takes some 300 bytes.
   static constexpr std::size_t kMostEdges = 262'144;
 
@@ -62,6 +64,10 @@ class Pushes {
 
   /// Pushes all values to a group: a watcher has only now been matched.
   void tell_all(std::uint64_t group);
+
+  /// Histories are about to be cleared: the next run() first pushes what was written until now to
+  /// those that want all samples.
+  void keep_pending();
 
   /// Pushes what was written since the last run, and ends groups that are not renewed. @return when
   /// to run again, unless woken before
@@ -104,6 +110,7 @@ class Pushes {
   std::map<PeerId, Watcher> watchers_ TFDUDE_GUARDED_BY(mutex_);
   std::size_t edges_ TFDUDE_GUARDED_BY(mutex_) = 0;             // of all groups
   std::vector<std::uint64_t> ended_ TFDUDE_GUARDED_BY(mutex_);  // whose end is not reported yet
+  std::vector<PushedValues> pending_ TFDUDE_GUARDED_BY(mutex_);
   bool stopped_ TFDUDE_GUARDED_BY(mutex_) = false;
 };
 

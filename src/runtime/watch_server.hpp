@@ -33,6 +33,9 @@ class WatchServer final : private Pushes::Sink {
   /// How many groups of watchers were rejected.
   [[nodiscard]] std::uint64_t refused() const { return pushes_.refused(); }
 
+  /// Histories are about to be cleared: watchers get what was written before.
+  void keep_pending() { pushes_.keep_pending(); }
+
   /// A watcher of the group has only now been matched.
   void on_watcher(std::uint64_t group) { pushes_.tell_all(group); }
 

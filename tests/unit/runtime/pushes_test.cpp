@@ -192,4 +192,37 @@ TEST_CASE("pushes: a period above the maximum is rejected") {
   REQUIRE(eventually([&] { return owner.count(1) == 1; }));
 }
 
+TEST_CASE("pushes: what was written before histories are cleared is pushed, too") {
+  struct Stamps final : Pushes::Sink {
+    void push(const PushedValues& values) override {
+      for (const PushedValue& entry : values.entries) {
+        if (entry.stamp) all.push_back(*entry.stamp);
+      }
+    }
+    void end(std::uint64_t) override {}
+    void wake() override {}
+    std::vector<Time> all;
+  } sink;
+  Forest forest;
+  REQUIRE(forest.add("base", "", along_x(0)));
+  REQUIRE(forest.add("arm", "base", along_x(0)));
+  Pushes pushes(forest, 10, sink);
+  const auto rounds = GENERATE(1, 3);
+  REQUIRE(pushes.watch(1, {{kArm}}));
+  REQUIRE(pushes.watch(2, {{kArm}, false, false, 1h}));
+  (void)pushes.run();
+  std::vector<Time> expected;
+  for (int round = 0; round < rounds; ++round) {
+    for (const int at : {10, 20, 30}) {
+      REQUIRE(forest.update("arm", along_x(at + round), ms(at + round)));
+      expected.push_back(ms(at + round));
+    }
+    pushes.keep_pending();
+    CHECK(forest.clear_histories(ms(0)) == 1);
+  }
+  (void)pushes.run();
+  CHECK(sink.all == expected);
+  pushes.stop();
+}
+
 }  // namespace tfdude
