@@ -33,6 +33,7 @@ struct Edge {
 };
 
 /// A climb from a frame S, as far as it is accumulated.
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): what is not read is not written
 struct Climb {
   bool empty = true;  ///< S itself; the rest is not written yet
   Columns X_SH;       ///< pose of the frame reached (here, H)

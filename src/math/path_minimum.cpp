@@ -61,8 +61,10 @@ class Descent {
     if (found.converged && found.cost() <= kDoubtful * found.S.rank()) return found;
     // Perhaps not the least minimum. Another way to it: from less precise measurements to this one.
     start();
-    for (double share = 1.0; share > kComparedAs; share *= 0.25) {
+    double share = 1.0;
+    while (share > kComparedAs) {
       (void)approach(joined(R_, share * path_), kIterationsAtOnce);
+      share *= 0.25;
     }
     PathMinimum other = approach(R_, kMostIterations);
     if (other.converged && !(found.converged && found.cost() <= other.cost())) return other;
@@ -148,8 +150,9 @@ class Descent {
     const double gain = before - cost(whole, expected(whole, now));
     const bool last = is_small(whole) || gain <= hidden_gain(before);
     double share = 1.0;
-    for (int halving = 0; halving < kMostHalvings; ++halving, share *= 0.5) {
+    for (int halving = 0; halving < kMostHalvings; ++halving) {
       EdgeErrors next = of(between(at_.deviations, whole.deviations, share));
+      share *= 0.5;
       LinearPath linear = linearize(all_, next.xi, Z_AB_);
       if (!last && !(cost(next, linear.h) < before)) continue;
       at_ = std::move(next);

@@ -200,9 +200,9 @@ void MemoryReads::look_again() {
     const Lock owners(mutex_);
     for (auto known = owners_.begin(); known != owners_.end();) {
       const auto& [owner, state] = *known;
-      const Directory& directory = structure_.directory;
-      const auto serving =
-          directory.reachable(owner) ? directory.serving(directory.name(owner)) : std::nullopt;
+      const auto serving = structure_.directory.reachable(owner)
+                               ? structure_.directory.serving(structure_.directory.name(owner))
+                               : std::nullopt;
       const bool same = serving && serving->incarnation == state.incarnation;
       if (same && state.state == Known::State::kAttached) {
         other_clocks = other_clocks || clock_of(*serving) != structure_.clock.kind();

@@ -155,6 +155,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   }
   /// What is found in the memory of the owners, or was there last.
   [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;
+  void note_read(std::int64_t stamp) const;
   /// Whether the memory of all owners of the route is known.
   [[nodiscard]] bool reads_all(MemoryReads& memory) const;
   /// The last transform, if nobody has read a later one.

@@ -70,12 +70,14 @@ Result<StampedTransform> WatchedPath::lookup_in(MemoryReads& memory, const Query
     explain(memory, query, found.error());
     return found;
   }
-  if (!found->stamp) return found;
+  if (found->stamp) note_read(nanoseconds(*found->stamp));
+  return found;
+}
+
+void WatchedPath::note_read(std::int64_t stamp) const {
   std::int64_t latest = latest_read_.load(std::memory_order_relaxed);
-  const std::int64_t stamp = nanoseconds(*found->stamp);
   while (stamp > latest && !latest_read_.compare_exchange_weak(latest, stamp)) {
   }
-  return found;
 }
 
 bool WatchedPath::reads_all(MemoryReads& memory) const {

@@ -52,6 +52,7 @@ class Arena {
   Arena(void* memory, std::size_t size);
   Arena(const Arena&) = delete;
   Arena& operator=(const Arena&) = delete;
+  ~Arena() = default;
 
   [[nodiscard]] SharedRoots& roots() { return *roots_; }
   /// Whether other processes may read.

@@ -24,11 +24,11 @@ class RemoteEdges {
  public:
   /// An edge that is bound.
   struct Binding {
-    Owner owner;
-    std::uint32_t attachment;  // of this forest's edge
-    const RemoteForest* forest;
-    std::size_t index;  // of the forest, below kMostOwners
-    RemotePlace place;
+    Owner owner = kHeldHere;
+    std::uint32_t attachment = 0;  // of this forest's edge
+    const RemoteForest* forest = nullptr;
+    std::size_t index = 0;  // of the forest, below kMostOwners
+    RemotePlace place{};
   };
   /// Of those that are attached at the same time.
   static constexpr std::size_t kMostOwners = 256;
@@ -110,6 +110,7 @@ class RemoteReading {
  public:
   static constexpr bool kNone = false;
 
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): `taken_` says which owners are written
   explicit RemoteReading(const RemoteEdges& edges) : edges_(edges) {}
 
   /// The edge; without a version if it cannot be read. Its commit is taken with the first edge of

@@ -63,7 +63,7 @@ struct Interval {
 /// An error for people: the message names the frame, the partition and the value concerned. Errors
 /// of lookups also have these as data.
 struct Error {
-  Errc code;
+  Errc code{};
   std::string message;
   std::string frame{};      ///< that is missing, or whose edge is the cause; empty: see the message
   std::string partition{};  ///< that is missing, does not answer, or has answered; empty: not known
