@@ -2,7 +2,9 @@
 
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -19,9 +21,18 @@ struct RotationAxes {
   int known = 0;
 };
 
-RotationAxes axes_of(const Covariance& R) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turns(R.matrix().bottomRightCorner<3, 3>());
-  RotationAxes found{turns.eigenvectors(), turns.eigenvalues(), 0};
+// Of a root, by Jacobi's method: beside deviations of 1e9 rad, those that are known keep all their
+// digits (J. Demmel, K. Veselić, "Jacobi's method is more accurate than QR", SIAM Journal on Matrix
+// Analysis and Applications 13, 1992).
+RotationAxes axes_of(const Loading& root) {
+  RotationAxes found{Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(), 0};
+  if (root.cols() > 0) {
+    const Eigen::MatrixXd turns = root.bottomRows<3>().transpose();
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(turns, Eigen::ComputeFullV);
+    found.axes = svd.matrixV().rowwise().reverse();
+    const Eigen::Index count = svd.singularValues().size();
+    found.variances.tail(count) = svd.singularValues().reverse().cwiseAbs2();
+  }
   while (found.known < 3 && found.variances[found.known] < kAnywhere) ++found.known;
   return found;
 }
@@ -43,7 +54,7 @@ Transform turned_by(const Transform& Z_AB, const Eigen::Quaterniond& T, const Ma
 
 // Only the turn about one axis is known. How it depends on the rotation of the path, whose axes are
 // others, is what the measurement says of that.
-Transform with_one_turn(const Transform& Z_AB, const RotationAxes& of,
+Transform with_one_turn(const Transform& Z_AB, const Loading& root, const RotationAxes& of,
                         const Eigen::Quaterniond& E) {
   const Eigen::Vector3d w = of.axes.col(0);
   const double a = E.vec().dot(w);
@@ -51,7 +62,6 @@ Transform with_one_turn(const Transform& Z_AB, const RotationAxes& of,
   const double size = a * a + c * c;
   // Nearly half a turn across the axis: the turn about it is undetermined, and so means nothing.
   constexpr double kUndetermined = 1e-6;
-  const Matrix6d& R = Z_AB.covariance.of_specified().matrix();
   if (size < kUndetermined) return Z_AB;
   const double turn = 2 * std::atan2(c < 0 ? -a : a, std::abs(c));
   // The derivative of that angle by a turn of the path in its own axes.
@@ -62,23 +72,23 @@ Transform with_one_turn(const Transform& Z_AB, const RotationAxes& of,
   const Eigen::Matrix3d turned = T.toRotationMatrix();
   const Eigen::Matrix3d across =
       Eigen::Matrix3d::Identity() - by * by.transpose() / by.squaredNorm();
-  Matrix6d all = Matrix6d::Zero();
-  all.topLeftCorner<3, 3>() = turned.transpose() * R.topLeftCorner<3, 3>() * turned;
-  all.bottomRightCorner<3, 3>() = of.variances[0] * by * by.transpose() + kNothing * across;
-  all.topRightCorner<3, 3>() = turned.transpose() * R.topRightCorner<3, 3>() * w * by.transpose();
-  all.bottomLeftCorner<3, 3>() = all.topRightCorner<3, 3>().transpose();
+  Loading known(6, root.cols());
+  known << turned.transpose() * root.topRows<3>(), by * (w.transpose() * root.bottomRows<3>());
+  Matrix6d all = known * known.transpose();
+  all.bottomRightCorner<3, 3>() += kNothing * across;
   return turned_by(Z_AB, T, all);
 }
 
 }  // namespace
 
-int unknown_rotations(const Covariance& R) { return 3 - axes_of(R).known; }
+int unknown_rotations(const Covariance& R) { return 3 - axes_of(root_of(R.matrix())).known; }
 
 Transform with_unknown_rotation_of(const Pose& X_AB, const Transform& Z_AB) {
-  const RotationAxes of = axes_of(Z_AB.covariance.of_specified());
+  const Loading root = root_of(Z_AB.covariance.of_specified().matrix());
+  const RotationAxes of = axes_of(root);
   if (of.known == 3) return Z_AB;
   const Eigen::Quaterniond E = Z_AB.pose.rotation().conjugate() * X_AB.rotation();
-  if (of.known == 1) return with_one_turn(Z_AB, of, E);
+  if (of.known == 1) return with_one_turn(Z_AB, root, of, E);
   const Eigen::Quaterniond T = of.known == 0 ? E : about(of.axes.col(2), E);
   const Eigen::Matrix3d turned = T.toRotationMatrix();
   Matrix6d turn = Matrix6d::Zero();
@@ -87,7 +97,8 @@ Transform with_unknown_rotation_of(const Pose& X_AB, const Transform& Z_AB) {
   Matrix6d known = Matrix6d::Identity();
   const Eigen::MatrixXd unknown = of.axes.rightCols(3 - of.known);
   known.bottomRightCorner<3, 3>() -= unknown * unknown.transpose();
-  Matrix6d R = known * Z_AB.covariance.of_specified().matrix() * known;
+  const Loading left = known * root;
+  Matrix6d R = left * left.transpose();
   R.bottomRightCorner<3, 3>() += kNothing * unknown * unknown.transpose();
   return turned_by(Z_AB, T, turn * R * turn.transpose());
 }

@@ -138,4 +138,37 @@ TEST_CASE("A measurement that knows nothing of some rotations is consistent in 2
   CHECK(std::abs(sum / kRuns - 6) < 4 * std::sqrt(12.0 / kRuns));
 }
 
+TEST_CASE("How little is said of an unknown axis does not change what is said of the others") {
+  Random random(0x1e9);
+  INFO("seed " << random.seed());
+  for (int i = 0; i < 200; ++i) {
+    const Pose X_AB = random.pose();
+    const Pose Z_AB = X_AB * exp(Twist(0.3 * Twist::NullaryExpr([&] { return random.normal(); })));
+    const std::size_t unknown = 1 + random.index(3);
+    const auto stated = [&](double sigma) {
+      Twist deviations;
+      deviations << 0.002, 0.003, 0.1, 0.004, 0.005, 0.006;
+      for (std::size_t k = 0; k < unknown; ++k)
+        deviations[static_cast<Eigen::Index>(3 + k)] = sigma;
+      return Transform{Z_AB, Covariance::trusted(Matrix6d(deviations.cwiseAbs2().asDiagonal()))};
+    };
+    const Transform expected = with_unknown_rotation_of(X_AB, stated(100));
+    const Matrix6d& R = expected.covariance.of_specified().matrix();
+    const Twist deviations = R.diagonal().cwiseSqrt();
+    for (const double sigma : {1e4, 1e6, 1e9, 1e12}) {
+      INFO(unknown << " unknown axes, sigma " << sigma);
+      CHECK(unknown_rotations(stated(sigma).covariance.of_specified()) ==
+            static_cast<int>(unknown));
+      const Transform found = with_unknown_rotation_of(X_AB, stated(sigma));
+      CHECK(found.pose.rotation().angularDistance(expected.pose.rotation()) < 1e-9);
+      const Matrix6d off = found.covariance.of_specified().matrix() - R;
+      for (Eigen::Index row = 0; row < 6; ++row) {
+        for (Eigen::Index col = 0; col < 6; ++col) {
+          CHECK(std::abs(off(row, col)) < 1e-6 * deviations[row] * deviations[col]);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace tfdude
