@@ -4,12 +4,16 @@
 
 namespace tfdude::cli {
 
-/// The signals that stop a program that runs until then.
+/// The signals that stop a program that runs until then; SIGHUP, by which a terminal ends, unless
+/// the program is to survive that (nohup).
 [[nodiscard]] inline sigset_t stop_signals() {
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
+  struct sigaction hangup {};
+  const bool ignored = sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler == SIG_IGN;
+  if (!ignored) sigaddset(&signals, SIGHUP);
   return signals;
 }
 

@@ -10,7 +10,7 @@
 
 namespace tfdude::cli {
 
-/// The lines of a file or of standard input, until its end or an interrupt (SIGINT, SIGTERM, which
+/// The lines of a file or of standard input, until its end or an interrupt (stop_signals(), which
 /// the process blocks). A pipe may get its writer later. No line is longer than 16 MiB, which is
 /// also what is kept of a file without lines.
 class Lines {

@@ -29,6 +29,9 @@ Result<Time> parse_stamp(const std::string& text, Time now) {
     const Time stamp = before_now ? now - typed : Time(typed);
     if (nanoseconds(stamp) >= 0) return stamp;
   }
+  if (decimal && end == text.c_str() + text.size() && ns > kLast) {
+    return fail(Errc::kInvalidInput, quote(text) + " is no stamp: the last is 9223372036 s");
+  }
   return fail(Errc::kInvalidInput, quote(text) +
                                        " is not a stamp: decimal seconds since the epoch or, where "
                                        "negative, before now");

@@ -19,9 +19,10 @@ inline constexpr Milliseconds kLongestPause{50};
 /// @param wait  zero: only the call
 /// @param ready  takes how long to wait. @return why nothing can be called
 /// @param call  has a deadline of its own
-template <class Ready, class Call>
-[[nodiscard]] auto after_wait(Lookups& lookups, Milliseconds wait, Ready ready, Call call)
-    -> decltype(call()) {
+/// @param passes  whether an error with this code may pass by itself
+template <class Ready, class Call, class Passes = bool (*)(Errc)>
+[[nodiscard]] auto after_wait(Lookups& lookups, Milliseconds wait, Ready ready, Call call,
+                              Passes passes = may_return) -> decltype(call()) {
   const Deadline until(wait);
   for (auto pause = kShortestPause;; pause = std::min(2 * pause, kLongestPause)) {
     if (!until.over()) {
@@ -29,7 +30,7 @@ template <class Ready, class Call>
       if (!there) return tl::unexpected(std::move(there.error()));
     }
     auto result = call();
-    if (result || until.over() || !may_return(result.error().code)) return result;
+    if (result || until.over() || !passes(result.error().code)) return result;
     // What is waited for may be there all the time.
     if (!lookups.pause(std::min(Deadline(pause).at(), until.at()))) return result;
   }

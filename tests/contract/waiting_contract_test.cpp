@@ -102,6 +102,16 @@ TEST_CASE("waiting: each call that reads waits for frames and data") {
               next()));
   CHECK(after([&] { return client.lookup("tip", at(0), "tip", at(ms), "world", 20s); }, next()));
   CHECK(after([&] { return client.velocity("world", "tip", {instant(ms), 10ms}, 20s); }, next()));
+  // A history that reaches no further than the newest interval will.
+  CHECK(client.velocity("world", "tip", {{}, 60ms}).error().code == Errc::kTooOld);
+  CHECK(client.velocity("world", "tip", {{}, 60ms}, 20ms).error().code == Errc::kTooOld);
+  CHECK(client.velocity("world", "tip", {Time{}, 60ms}, 20s).error().code == Errc::kTooOld);
+  CHECK(after(
+      [&] {
+        return client.velocity("world", "tip", {{}, 60ms}, 20s);
+      },
+      [&] { CHECK(world.node.update("base", ahead(60), instant(60))); }));
+  ms = 60;
   CHECK(after([&] { return client.trajectory("world", "tip", {instant(ms)}, {}, 20s); }, next())
             ->missing.empty());
   const auto watch = after([&] { return client.watch("world", "hand", {}, 20s); },
