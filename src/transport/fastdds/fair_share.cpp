@@ -1,7 +1,6 @@
 #include "transport/fastdds/fair_share.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/log.hpp"
 
@@ -9,6 +8,8 @@ namespace tfdude::fastdds {
 namespace {
 
 constexpr double kMemorySeconds = std::chrono::duration<double>(FairShare::kMemory).count();
+
+constexpr double kGraceSeconds = std::chrono::duration<double>(FairShare::kGrace).count();
 
 // A sender that takes less than this part of the time is not heavy.
 constexpr double kLight = 0.05;
@@ -34,36 +35,57 @@ void FairShare::has_message() { load.has_message = true; }
 
 void FairShare::end(Clock::time_point now) { load.free_since = now; }
 
-double FairShare::Account::now(Clock::time_point now) const {
-  return seconds * std::exp(-std::chrono::duration<double>(now - at).count() / kMemorySeconds);
+double FairShare::owed(const Account& account, Clock::time_point now) const {
+  const double passed = std::chrono::duration<double>(now - account.at).count();
+  return std::max(0.0, account.seconds - passed * kShare / std::max(1, heavy_));
+}
+
+bool FairShare::is_contended(Sender sender, Clock::time_point now) {
+  if (last_.sender != sender) last_other_ = last_;
+  last_ = {sender, now};
+  return last_other_.at != Clock::time_point{} && now - last_other_.at < kActive;
 }
 
 void FairShare::count(Clock::time_point now) {
   counted_ = now;
   heavy_ = active_ = 0;
   for (const auto& [sender, account] : accounts_) {
-    if (account.now(now) > kLight * kMemorySeconds) ++heavy_;
+    if (owed(account, now) > kLight * kMemorySeconds) ++heavy_;
     if (now - account.active < kActive) ++active_;
   }
 }
 
-bool FairShare::admits(Sender sender, Clock::time_point now) {
-  if (now - load.busy_since < kOverloadedAfter) return true;
-  {
-    const Lock lock(mutex_);
-    const auto known = accounts_.find(sender);
-    if (known == accounts_.end()) return true;
-    if (now - counted_ > kRecountEvery || now < counted_) count(now);
-    const double taken = known->second.now(now);
-    const int heavy = std::max(1, heavy_ + (taken > kLight * kMemorySeconds ? 0 : 1));
-    if (active_ <= 1 || taken <= kShare / heavy * kMemorySeconds) return true;
-  }
+bool FairShare::drop() {
   const std::uint64_t before = dropped_.fetch_add(1, std::memory_order_relaxed);
   if ((before & (before + 1)) == 0) {  // the 1st, 2nd, 4th, 8th...
     log().warn("dropped a datagram of a sender that takes more than its share ({} so far)",
                before + 1);
   }
   return false;
+}
+
+// Between its messages the thread may be idle, and each makes the others wait.
+bool FairShare::admits_idle(Sender sender, Clock::time_point now) {
+  if (now.time_since_epoch().count() >= grace_used_until_.load(std::memory_order_relaxed)) {
+    return true;
+  }
+  const Lock lock(mutex_);
+  const auto known = accounts_.find(sender);
+  return known == accounts_.end() || owed(known->second, now) <= kGraceSeconds;
+}
+
+bool FairShare::admits(Sender sender, Clock::time_point now) {
+  if (now - load.busy_since < kOverloadedAfter) return admits_idle(sender, now) || drop();
+  {
+    const Lock lock(mutex_);
+    const auto known = accounts_.find(sender);
+    if (known == accounts_.end()) return true;
+    if (now - counted_ > kRecountEvery || now < counted_) count(now);
+    const double taken = owed(known->second, now);
+    const int heavy = std::max(1, heavy_ + (taken > kLight * kMemorySeconds ? 0 : 1));
+    if (active_ <= 1 || taken <= kShare / heavy * kMemorySeconds) return true;
+  }
+  return drop();
 }
 
 void FairShare::spent(Sender sender, Clock::duration time, Clock::time_point now) {
@@ -75,9 +97,19 @@ void FairShare::spent(Sender sender, Clock::duration time, Clock::time_point now
   account.allowance = std::min(kAllowance, account.allowance + passed * kAllowanceGrowth);
   const bool counts = load.has_message || account.allowance < seconds;
   if (!counts) account.allowance -= seconds;
-  account.seconds = account.now(now) + (counts ? seconds : 0);
+  const double owed_before = owed(account, now);
+  const bool delays = time > kOverloadedAfter || now - time - load.busy_since >= kOverloadedAfter;
+  const double most = counts && is_contended(sender, now) && delays
+                          ? std::chrono::duration<double>(kMostOwed).count()
+                          : std::max(owed_before, kMemorySeconds);
+  account.seconds = counts ? std::min(owed_before + seconds, most) : owed_before;
   account.at = now;
   if (counts) account.active = now;
+  if (account.seconds > kGraceSeconds) {
+    // At least for as long as it takes to pay it back.
+    const auto until = now + std::chrono::seconds(1 + 2 * std::max(1, heavy_));
+    grace_used_until_.store(until.time_since_epoch().count(), std::memory_order_relaxed);
+  }
   if (!is_new || accounts_.size() <= kMost) return;
   accounts_.erase(
       std::min_element(accounts_.begin(), accounts_.end(),

@@ -16,7 +16,9 @@ namespace tfdude::fastdds {
 /// share of its time are dropped before Fast DDS sees them, which takes a fraction of the time.
 /// What was to arrive reliably is repeated, when its sender is within its share again.
 ///
-/// The time that a sender took is forgotten exponentially. Time comes from outside.
+/// A sender owes the time that it took, and pays it back at its share, also while it pauses: who
+/// pauses is no new sender. What was taken while nobody else sent, or without making others wait,
+/// is owed only up to kMemory. Time comes from outside.
 /// @par Thread safety  begin(), end() and admits() are for the thread that handles a datagram; all
 ///   other functions are thread-safe.
 class FairShare {
@@ -29,8 +31,12 @@ class FairShare {
   static constexpr std::chrono::microseconds kGap{15};
   /// Overloaded is who has had messages waiting for this long.
   static constexpr std::chrono::microseconds kOverloadedAfter{500};
-  /// Time constant of forgetting.
+  /// A sender may owe its share of this time, and no more while messages wait.
   static constexpr std::chrono::milliseconds kMemory{50};
+  /// If none wait: who has requests of such a size has seldom.
+  static constexpr std::chrono::milliseconds kGrace{250};
+  /// What is owed at most.
+  static constexpr std::chrono::seconds kMostOwed{1};
   /// The share of all heavy senders together. The rest of the time is for the others, and for
   /// dropping.
   static constexpr double kShare = 0.5;
@@ -64,10 +70,20 @@ class FairShare {
     Clock::time_point at;
     double allowance = kAllowance;
     Clock::time_point active{};  // when something was charged last
-
-    [[nodiscard]] double now(Clock::time_point now) const;
   };
 
+  struct Charged {
+    Sender sender = 0;
+    Clock::time_point at{};
+  };
+
+  /// What it owes now [s].
+  [[nodiscard]] double owed(const Account& account, Clock::time_point now) const
+      TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool admits_idle(Sender sender, Clock::time_point now);
+  /// Whether another sender is active. Counts this one.
+  [[nodiscard]] bool is_contended(Sender sender, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  bool drop();
   void count(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
 
   Mutex mutex_;
@@ -76,6 +92,9 @@ class FairShare {
   Clock::time_point counted_ TFDUDE_GUARDED_BY(mutex_);
   int heavy_ TFDUDE_GUARDED_BY(mutex_) = 0;
   int active_ TFDUDE_GUARDED_BY(mutex_) = 0;
+  Charged last_ TFDUDE_GUARDED_BY(mutex_);        // who was charged last
+  Charged last_other_ TFDUDE_GUARDED_BY(mutex_);  // and who before, if it was another one
+  std::atomic<Clock::rep> grace_used_until_{0};   // nobody owes more than kGrace after that
   std::atomic<std::uint64_t> dropped_{0};
 };
 

@@ -106,6 +106,64 @@ TEST_CASE("fair share: a flood of ever new senders takes no memory, and forgets 
   CHECK(thread.shares.dropped() > 10'000);
 }
 
+// The share of a sender of costly messages that pauses for so long after each, beside another one
+// that sends each 10 ms, and how many of this one's were dropped.
+struct Paused {
+  double share = 0;
+  int dropped = 0;
+};
+Paused beside_pauses(std::chrono::milliseconds cost, std::chrono::milliseconds pause) {
+  Thread thread;
+  Paused result;
+  const auto start = thread.now;
+  auto spent = 0ms;
+  auto next_other = thread.now;
+  const auto others = [&] {
+    for (; next_other <= thread.now; next_other += 10ms) {
+      if (!thread.handle(kOther, 20us, 1us)) ++result.dropped;
+    }
+  };
+  while (thread.now - start < 60s) {
+    // What was dropped is repeated.
+    if (thread.handle(kFlood, cost, 100us)) spent += cost;
+    const auto again = thread.now + pause;
+    others();
+    for (; thread.now < again; thread.now += 1ms) others();
+  }
+  result.share = std::chrono::duration<double>(spent) / (thread.now - start);
+  return result;
+}
+
+// Before, what it took was forgotten after 140 ms, however much that was.
+TEST_CASE("fair share: who pauses between costly messages pays them back") {
+  for (const auto cost : {30ms, 100ms, 400ms}) {
+    for (const auto pause : {1ms, 20ms, 150ms}) {
+      CAPTURE(cost.count(), pause.count());
+      const Paused one = beside_pauses(cost, pause);
+      CHECK(one.share < 0.57);
+      CHECK(one.dropped == 0);
+    }
+  }
+  CHECK(beside_pauses(400ms, 100ms).share > 0.4);
+}
+
+TEST_CASE("fair share: costly messages are not dropped while their sender is within its share") {
+  for (const auto cost : {10ms, 100ms, 200ms}) {
+    CAPTURE(cost.count());
+    const double share = beside_pauses(cost, 2 * cost).share;
+    CHECK(share > 0.3);
+  }
+}
+
+TEST_CASE("fair share: what was taken alone is not owed") {
+  Thread thread;
+  for (int i = 0; i < 600; ++i) CHECK(thread.handle(kFlood, 100ms, 100us));
+  CHECK(thread.handle(kOther, 20us, 1us));
+  thread.now += 60ms;
+  CHECK(thread.handle(kFlood, 100ms, 100us));
+  CHECK(thread.shares.dropped() == 0);
+}
+
 TEST_CASE("fair share: a flood that ends is forgotten") {
   Thread thread;
   for (int i = 0; i < 100'000; ++i) {
