@@ -54,9 +54,13 @@ void Admission::left(const PeerId& peer) {
 }
 
 void Admission::note_awaited() {
-  awaited_ = std::any_of(candidates_.begin(), candidates_.end(), [](const auto& candidate) {
-    return !candidate.second.said.partition.empty() && candidate.second.excluded_because.empty();
-  });
+  Clock::rep latest = 0;
+  for (const auto& [peer, candidate] : candidates_) {
+    if (candidate.said.partition.empty() || !candidate.excluded_because.empty()) continue;
+    const auto until = candidate.since + kAwaitedFor;
+    latest = std::max<Clock::rep>(latest, until.time_since_epoch().count());
+  }
+  awaited_until_ = latest;
 }
 
 std::vector<std::string> Admission::excluded() const {

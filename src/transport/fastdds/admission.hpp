@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <set>
@@ -32,9 +33,17 @@ class Admission {
   void authenticated(const PeerId& peer, bool verified);
   void left(const PeerId& peer);
 
-  /// Whether an owner was discovered that has yet to be authenticated. Takes no lock: it is asked
-  /// while a message is received, too.
-  [[nodiscard]] bool awaits_authentication() const { return awaited_; }
+  using Clock = std::chrono::steady_clock;
+
+  /// A handshake takes a twentieth of this, and each of its messages may be lost.
+  static constexpr std::chrono::milliseconds kAwaitedFor{2100};
+
+  /// Whether an owner was discovered that has yet to be authenticated, and not longer ago than
+  /// kAwaitedFor: anybody can announce one. Takes no lock: it is asked while a message is received,
+  /// too.
+  [[nodiscard]] bool awaits_authentication(Clock::time_point now = Clock::now()) const {
+    return now.time_since_epoch().count() < awaited_until_.load(std::memory_order_relaxed);
+  }
 
   /// The owners that are excluded: a sentence each.
   [[nodiscard]] std::vector<std::string> excluded() const;
@@ -43,6 +52,7 @@ class Admission {
   struct Candidate {
     Announcement said;
     std::string excluded_because;  // empty: it may still be met
+    Clock::time_point since = Clock::now();
   };
   [[nodiscard]] std::string reason_against(const Announcement& said) const;
   void note_awaited() TFDUDE_REQUIRES(mutex_);
@@ -52,7 +62,7 @@ class Admission {
   mutable Mutex mutex_{LockRank::kAnnouncing};
   std::map<PeerId, Candidate> candidates_ TFDUDE_GUARDED_BY(mutex_);
   std::set<PeerId> verified_ TFDUDE_GUARDED_BY(mutex_);
-  std::atomic<bool> awaited_{false};
+  std::atomic<Clock::rep> awaited_until_{0};
 };
 
 }  // namespace tfdude::fastdds

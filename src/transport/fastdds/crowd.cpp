@@ -14,26 +14,38 @@ bool Crowd::admit(const PeerId& peer, Clock::time_point now) {
   const Lock lock(mutex_);
   const auto same = announced_.find(peer);
   if (same != announced_.end()) {
-    same->second = now;
+    same->second.heard = now;
     return true;
   }
   // Not for each announcement of a flood.
   constexpr std::chrono::milliseconds kLookEvery{100};
-  if (announced_.size() >= kMost && now - looked_ > kLookEvery) {
-    looked_ = now;
-    for (auto one = announced_.begin(); one != announced_.end();) {
-      if (now - one->second <= kPatience) {
-        ++one;
-        continue;
-      }
-      leave_.push_back(one->first);
-      one = announced_.erase(one);
-    }
-    any_ = !leave_.empty();
-  }
-  if (announced_.size() >= kMost) return false;
-  announced_.emplace(peer, now);
+  if (!has_room() && now - looked_ > kLookEvery) make_room(now);
+  if (!has_room()) return false;
+  announced_.emplace(peer, Present{now, now});
+  ++unverified_;
   return true;
+}
+
+void Crowd::make_room(Clock::time_point now) {
+  looked_ = now;
+  for (auto one = announced_.begin(); one != announced_.end();) {
+    const Present& there = one->second;
+    const bool unproven = verifies_ && !there.verified && now - there.since > kVerifiedWithin;
+    if (!unproven && now - there.heard <= kPatience) {
+      ++one;
+      continue;
+    }
+    if (!there.verified) --unverified_;
+    leave_.push_back(one->first);
+    one = announced_.erase(one);
+  }
+  any_ = !leave_.empty();
+}
+
+void Crowd::verified(const PeerId& peer) {
+  const Lock lock(mutex_);
+  const auto there = announced_.find(peer);
+  if (there != announced_.end() && !std::exchange(there->second.verified, true)) --unverified_;
 }
 
 std::vector<PeerId> Crowd::take_all() {

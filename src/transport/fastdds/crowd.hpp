@@ -15,6 +15,10 @@ namespace tfdude::fastdds {
 /// its endpoints, for as long as the lease that the other one has chosen. If there are kMost, one
 /// that has not announced itself for kPatience makes room for a new one; if there is none, the new
 /// one has to wait. Announcements are periodic, and those that are made up are mostly not.
+///
+/// With keys, Fast DDS sends handshakes to each of them, again and again, and whoever is real is
+/// verified soon. So only kMostUnverified are not verified at a time, and one that was not within
+/// kVerifiedWithin makes room, even if it goes on announcing itself.
 /// @par Thread safety  All functions are thread-safe.
 class Crowd {
  public:
@@ -22,10 +26,18 @@ class Crowd {
 
   static constexpr std::size_t kMost = 512;
   static constexpr std::chrono::seconds kPatience{10};
+  static constexpr std::size_t kMostUnverified = 48;
+  static constexpr std::chrono::seconds kVerifiedWithin{3};
+
+  /// @param verifies  the participant has keys
+  explicit Crowd(bool verifies = false) : verifies_(verifies) {}
 
   /// @return whether Fast DDS may have the announcement
   /// @par Complexity  O(1); O(kMost) if there are so many
   [[nodiscard]] bool admit(const PeerId& peer, Clock::time_point now);
+
+  /// Its identity was verified.
+  void verified(const PeerId& peer);
 
   /// Calls leave(peer) for each one that has made room.
   template <class Leave>
@@ -39,11 +51,23 @@ class Crowd {
     std::size_t operator()(const PeerId& peer) const;
   };
 
-  [[nodiscard]] std::vector<PeerId> take_all();
+  struct Present {
+    Clock::time_point since;
+    Clock::time_point heard;
+    bool verified = false;
+  };
 
+  [[nodiscard]] std::vector<PeerId> take_all();
+  [[nodiscard]] bool has_room() const TFDUDE_REQUIRES(mutex_) {
+    return announced_.size() < kMost && (!verifies_ || unverified_ < kMostUnverified);
+  }
+  void make_room(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+
+  const bool verifies_;
   std::atomic<bool> any_{false};
   Mutex mutex_;
-  std::unordered_map<PeerId, Clock::time_point, Hash> announced_ TFDUDE_GUARDED_BY(mutex_);
+  std::unordered_map<PeerId, Present, Hash> announced_ TFDUDE_GUARDED_BY(mutex_);
+  std::size_t unverified_ TFDUDE_GUARDED_BY(mutex_) = 0;
   Clock::time_point looked_ TFDUDE_GUARDED_BY(mutex_){};
   std::vector<PeerId> leave_ TFDUDE_GUARDED_BY(mutex_);
 };

@@ -26,7 +26,7 @@ class DatagramGuard {
   static constexpr std::chrono::seconds kLogEvery{60};
 
   /// @param secured  the participant has keys, with which all messages are protected as a whole
-  explicit DatagramGuard(bool secured) : secured_(secured) {}
+  explicit DatagramGuard(bool secured) : secured_(secured), crowd_(secured) {}
 
   /// All that the participant sends passes send(). Call it before the participant is created.
   void sees_all_sent() { sees_sent_ = !secured_; }
@@ -61,6 +61,9 @@ class DatagramGuard {
   }
 
   void send(const std::uint8_t* datagram, std::size_t size);
+
+  /// Fast DDS has verified its identity.
+  void verified(const PeerId& peer) { crowd_.verified(peer); }
 
   /// Calls leave(peer) for each participant that Fast DDS shall take for gone: those that have made
   /// room for others, and those that have said, unprotected, that they leave, and are silent since.

@@ -333,6 +333,7 @@ void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string&
 }
 
 void FastDdsTransport::authenticated(const ertps::GuidPrefix_t& prefix, bool verified) {
+  if (verified) guard_->verified(peer_of(prefix));
   admission_.authenticated(peer_of(prefix), verified);
 }
 

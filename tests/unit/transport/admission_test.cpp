@@ -46,6 +46,14 @@ TEST_CASE("admission: without keys, an owner that has some is named") {
   CHECK(door.admission.excluded().empty());
 }
 
+TEST_CASE("admission: an owner that is never verified is not awaited for ever") {
+  Door door("1");
+  door.admission.discovered(kPeer, owner_of("arm", "1"));
+  const auto now = Admission::Clock::now();
+  CHECK(door.admission.awaits_authentication(now));
+  CHECK_FALSE(door.admission.awaits_authentication(now + Admission::kAwaitedFor));
+}
+
 TEST_CASE("admission: with keys, only who is verified is met, in whatever order that is told") {
   Door door("1");
   SECTION("discovered first") {

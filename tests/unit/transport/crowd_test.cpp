@@ -56,4 +56,31 @@ TEST_CASE("crowd: a new one gets in when others have been silent") {
   CHECK(left(crowd).empty());
 }
 
+TEST_CASE("crowd: with keys, few are not verified at a time, and only for a while") {
+  Crowd crowd(true);
+  Crowd::Clock::time_point now{1h};
+  std::uint32_t next = 0;
+  // Those that are verified at once do not count.
+  for (; next < 200; ++next) {
+    REQUIRE(crowd.admit(peer(next), now));
+    crowd.verified(peer(next));
+    crowd.verified(peer(next));
+  }
+  const std::uint32_t honest = next;
+  for (std::size_t i = 0; i < Crowd::kMostUnverified; ++i) {
+    REQUIRE(crowd.admit(peer(next++), now));
+  }
+  CHECK_FALSE(crowd.admit(peer(9999), now));
+  // They go on announcing themselves.
+  for (std::uint32_t one = 0; one < next; ++one) CHECK(crowd.admit(peer(one), now + 2s));
+  CHECK_FALSE(crowd.admit(peer(9999), now + 2s));
+  CHECK(left(crowd).empty());
+  CHECK(crowd.admit(peer(9999), now + 4s));
+  const auto gone = left(crowd);
+  CHECK(gone.size() == Crowd::kMostUnverified);
+  for (const PeerId& one : gone) {
+    for (std::uint32_t i = 0; i < honest; ++i) REQUIRE(one != peer(i));
+  }
+}
+
 }  // namespace tfdude::fastdds
