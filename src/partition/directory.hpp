@@ -92,6 +92,10 @@ class Directory {
   /// The greatest other incarnation of this process's partition that others know and that would
   /// hide this one.
   [[nodiscard]] std::optional<std::uint64_t> hidden_by(std::uint64_t own) const;
+  /// Others may know this valid incarnation of this process's partition.
+  void others_know(std::uint64_t incarnation) {
+    own_heard_of_ = std::max(own_heard_of_, incarnation);
+  }
 
   /// Partitions of which messages were dropped as outdated since the last call; each incarnation
   /// once.

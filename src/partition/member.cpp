@@ -56,7 +56,10 @@ void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Ti
                      std::chrono::nanoseconds early) {
   outcome_.heard = to_settle_ = true;
   if (partition == name_) {
-    claim_.lost(incarnation);
+    // Others may have believed a process that was never told here.
+    if (!claim_.lost(incarnation) && presence_.serving && incarnation > presence_.incarnation) {
+      directory_.others_know(incarnation);
+    }
     overtake(now);
   }
   if (!directory_.lost(partition, incarnation, now, early)) return;
@@ -147,8 +150,8 @@ void Member::yield(const std::set<PendingYield>& due, bool current, Time now) {
 void Member::give_up(const Presence& rival) {
   const std::string own = "process " + std::to_string(presence_.pid) + " on host " + presence_.host;
   given_up_ = "partition " + quote(rival.partition) + " was taken over by process " +
-              std::to_string(rival.pid) + " on host " + rival.host + ", because " + own +
-              " was silent; " + own + " has given it up";
+              std::to_string(rival.pid) + " on host " + rival.host + ", which did not hear " + own +
+              "; " + own + " has given it up";
   presence_.serving = false;
   presence_.stopped = true;
   for (const FrameInfo& frame : forest_.frames()) {
@@ -166,7 +169,10 @@ void Member::overtake(Time now) {
   const auto latest = directory_.hidden_by(presence_.incarnation);
   if (partition_ == nullptr || !given_up_.empty() || !latest || claim_.served()) return;
   incarnations_.saw(*latest);
-  presence_.incarnation = incarnations_.next(now, presence_.ticket);
+  const std::uint64_t next = incarnations_.next(now, presence_.ticket);
+  // At the end of the range there is none.
+  if (next <= presence_.incarnation) return;
+  presence_.incarnation = next;
   partition_->overtake(presence_.incarnation);
   outcome_.overtook = presence_.incarnation;
   outcome_.to_commit = true;

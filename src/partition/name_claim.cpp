@@ -12,10 +12,12 @@ void NameClaim::hear(const Presence& presence) {
   }
 }
 
-void NameClaim::lost(std::uint64_t incarnation) {
+bool NameClaim::lost(std::uint64_t incarnation) {
+  const std::size_t before = rivals_.size();
   for (auto rival = rivals_.begin(); rival != rivals_.end();) {
     rival = rival->second.incarnation == incarnation ? rivals_.erase(rival) : std::next(rival);
   }
+  return rivals_.size() != before;
 }
 
 NameClaim::Turn NameClaim::to_take() const {

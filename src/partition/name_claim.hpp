@@ -35,8 +35,8 @@ class NameClaim {
 
   /// Another process's presence for the same partition.
   void hear(const Presence& presence);
-  /// The process that last announced this incarnation is lost.
-  void lost(std::uint64_t incarnation);
+  /// The process that last announced this incarnation is lost. @return whether it was known
+  bool lost(std::uint64_t incarnation);
 
   /// Evaluated before the name is taken.
   [[nodiscard]] Turn to_take() const;

@@ -133,7 +133,10 @@ class ParticipantListener final : public edds::DomainParticipantListener {
     if (info.status == ParticipantInfo::DISCOVERED_PARTICIPANT) {
       observer_.met(prefix, info.info.m_participantName.to_string(),
                     info.info.m_userData.data_vec());
-    } else if (info.status != ParticipantInfo::CHANGED_QOS_PARTICIPANT) {
+    } else if (info.status == ParticipantInfo::CHANGED_QOS_PARTICIPANT) {
+      observer_.changed(prefix, info.info.m_participantName.to_string(),
+                        info.info.m_userData.data_vec());
+    } else {
       observer_.left(prefix);
     }
   }
@@ -238,7 +241,9 @@ class ParticipantListener final : public edds::DomainParticipantListener {
     const auto& prefix = info.guid.guidPrefix;
     if (reason == ertps::ParticipantDiscoveryStatus::DISCOVERED_PARTICIPANT) {
       observer_.met(prefix, info.participant_name.to_string(), info.user_data.data_vec());
-    } else if (reason != ertps::ParticipantDiscoveryStatus::CHANGED_QOS_PARTICIPANT) {
+    } else if (reason == ertps::ParticipantDiscoveryStatus::CHANGED_QOS_PARTICIPANT) {
+      observer_.changed(prefix, info.participant_name.to_string(), info.user_data.data_vec());
+    } else {
       observer_.left(prefix);
     }
   }

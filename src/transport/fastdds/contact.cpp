@@ -2,6 +2,7 @@
 
 #include <set>
 #include <string>
+#include <vector>
 
 namespace tfdude::fastdds {
 namespace {
@@ -24,12 +25,12 @@ void Contact::announce(Writer& writer, const Presence& presence) {
 std::chrono::milliseconds Contact::look() {
   attention_.lower();
   const std::set<std::string> used = senders_.used_owners();
-  for (const std::string& partition :
-       peers_.look_for_silent(Peers::Clock::now(), next_look_, senders_.askable(used))) {
-    senders_.probe(partition);
-  }
+  const std::vector<std::string> unheard =
+      peers_.look_for_silent(Peers::Clock::now(), next_look_, senders_.askable(used));
+  for (const std::string& partition : unheard) senders_.probe(partition);
   const bool up_to_date = announce_count();
-  next_look_ = used.empty() && up_to_date ? Attention::kRarely : Attention::kOften;
+  const bool waits = !used.empty() || !unheard.empty() || !up_to_date;
+  next_look_ = waits ? Attention::kOften : Attention::kRarely;
   return next_look_;
 }
 

@@ -26,6 +26,8 @@ void FastDdsTransport::take_request(const wire::Request& sample, const ertps::Gu
                                             " may " + attempt_of(*request) + " in partition " +
                                             quote(options_.partition));
   }
+  // The sender repeats it; by then it is decided which process serves.
+  if (request && is_change(*request) && peers_.may_be_replaced()) return;
   if (request) {
     handler_->on_request(peer, *request);
     return;

@@ -201,6 +201,7 @@ Result<void> FastDdsTransport::read_requests(std::unique_ptr<Reader<wire::Reques
 
 Result<void> FastDdsTransport::serve(const std::string& partition) {
   using Info = edds::SampleInfo;
+  peers_.serve(partition);
   filters_ = std::make_unique<OwnedFilters>(partition, *handler_, *counters_);
   const auto filters = created("the filters of partition " + quote(partition), [&] {
     const bool known =
@@ -330,6 +331,14 @@ void FastDdsTransport::reply(const PeerId& to, wire::Reply& sample) {
 void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string& name,
                            const std::vector<std::uint8_t>& user_data) {
   admission_.discovered(peer_of(prefix), read_announcement(name, user_data));
+}
+
+// A forged announcement may have come before the true one.
+void FastDdsTransport::changed(const ertps::GuidPrefix_t& prefix, const std::string& name,
+                               const std::vector<std::uint8_t>& user_data) {
+  if (!peers_.is_incompatible(prefix)) return;
+  const Announcement said = read_announcement(name, user_data);
+  if (said.compatible()) admission_.discovered(peer_of(prefix), said);
 }
 
 void FastDdsTransport::authenticated(const ertps::GuidPrefix_t& prefix, bool verified) {

@@ -95,6 +95,8 @@ class FastDdsTransport final : public Transport {
   // Of ParticipantListener, from a thread of the library.
   void met(const ertps::GuidPrefix_t& prefix, const std::string& name,
            const std::vector<std::uint8_t>& user_data);
+  void changed(const ertps::GuidPrefix_t& prefix, const std::string& name,
+               const std::vector<std::uint8_t>& user_data);
   void left(const ertps::GuidPrefix_t& prefix);
   void authenticated(const ertps::GuidPrefix_t& prefix, bool verified);
   void writer_found(const ertps::GUID_t& writer, const std::vector<std::string>& partitions) {

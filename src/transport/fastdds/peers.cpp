@@ -6,6 +6,13 @@
 #include "base/mutex.hpp"
 
 namespace tfdude::fastdds {
+namespace {
+
+// Of participants that speak another major version.
+constexpr std::size_t kMostLogged = 256;
+
+}  // namespace
+
 PeerId peer_of(const ertps::GuidPrefix_t& prefix) {
   PeerId peer{};
   std::copy_n(prefix.value, peer.size(), peer.begin());
@@ -31,12 +38,14 @@ void Peers::met(const PeerId& peer, const Announcement& said) {
   const Lock lock(mutex_);
   last_met_ = Clock::now();
   if (said.compatible()) {
+    incompatible_.erase(peer);
     if (!said.partition.empty()) follow(peer);
     return;
   }
   IncompatiblePeer stranger{said.partition, said.protocol, said.program,
                             std::chrono::system_clock::now()};
-  if (logged_.insert(stranger.text()).second) {
+  // Anybody can announce any number of them.
+  if (logged_.size() < kMostLogged && logged_.insert(stranger.text()).second) {
     log().error("{}: no messages are exchanged with it", stranger.text());
   }
   incompatible_.insert_or_assign(peer, std::move(stranger));
@@ -50,7 +59,44 @@ Peers::Server& Peers::follow(const PeerId& peer) {
 
 void Peers::hear(Server& server, Clock::time_point at) {
   server.heard.last = at;
-  if (std::exchange(server.silent, false) && server.presence) there_(*server.presence);
+  if (std::exchange(server.silent, false) && server.presence) tell(server);
+}
+
+bool Peers::is_rival(const Server& server) const {
+  return !own_.empty() && server.presence && server.presence->partition == own_ &&
+         server.presence->serving;
+}
+
+void Peers::tell(Server& server) {
+  if (!is_rival(server) || server.proven) {
+    server.doubted_since.reset();
+    note_doubts();
+    return there_(*server.presence);
+  }
+  if (!server.doubted_since) server.doubted_since = server.heard.last;
+  note_doubts();
+}
+
+void Peers::note_doubts() {
+  any_doubted_ = std::any_of(servers_.begin(), servers_.end(),
+                             [](const auto& one) { return one.second.doubted_since.has_value(); });
+}
+
+bool Peers::ask_rival(Server& server, Clock::time_point now) {
+  if (!server.doubted_since) return false;
+  server.asked_for_proof = true;
+  if (now - *server.doubted_since < kProofWithin) return true;
+  server.doubted_since.reset();
+  gone_(*server.presence, {});
+  return false;
+}
+
+bool Peers::may_be_replaced() const {
+  if (!any_doubted_) return false;
+  const Lock lock(mutex_);
+  const auto now = Clock::now();
+  const bool is_held_up = now - last_look_ > patience_.look_every + kReplaceable;
+  return is_held_up || (held_up_ && now - *held_up_ < 2 * kProofWithin);
 }
 
 std::vector<IncompatiblePeer> Peers::incompatible() const {
@@ -78,6 +124,7 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const Server& server = known->second;
   if (server.said() != nullptr && !server.silent) gone_(*server.said(), {});
   servers_.erase(known);
+  note_doubts();
   any_overtaken_ = std::any_of(servers_.begin(), servers_.end(),
                                [](const auto& one) { return one.second.overtaken; });
 }
@@ -105,15 +152,19 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
   overtake(presence);
-  there_(presence);
+  tell(server);
 }
 
 void Peers::replied(const ertps::GuidPrefix_t& prefix) {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
-  known->second.heard.replied = true;
-  hear(known->second, Clock::now());
+  Server& server = known->second;
+  server.heard.replied = true;
+  hear(server, Clock::now());
+  if (server.proven || !server.asked_for_proof || !is_rival(server)) return;
+  server.proven = true;
+  tell(server);
 }
 
 std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::duration planned,
@@ -122,8 +173,11 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
   const Lock lock(mutex_);
   const auto late =
       std::max(now - std::exchange(last_look_, now) - planned, Clock::duration::zero());
+  if (late >= kReplaceable) held_up_ = now;
+  bool ask_rivals = false;
   for (auto& [id, server] : servers_) {
     server.heard.pass_over(late);
+    ask_rivals = ask_rival(server, now) || ask_rivals;
     if (const auto sign = life_signs_->last(id); sign && *sign > server.heard.last) {
       hear(server, *sign);
     }
@@ -138,8 +192,11 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
     }
     if (silence.kind != Silence::Kind::kLost) continue;
     server.silent = true;
+    server.doubted_since.reset();
     gone_(*said, silence.early);
   }
+  note_doubts();
+  if (ask_rivals) unheard.push_back(own_);
   return unheard;
 }
 

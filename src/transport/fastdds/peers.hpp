@@ -40,6 +40,10 @@ namespace tfdude::fastdds {
 /// periodically, so nothing else is sent while nobody depends on a server. Who depends on one is
 /// patient for a shorter time, and asks for a sign of life well before that time is over.
 ///
+/// Another server of this participant's own partition is reported once it has answered a request:
+/// what a single message says must not end an owner. One that does not answer in time is reported
+/// as gone, so that this participant goes on with a higher number than it.
+///
 /// Leases of Fast DDS 2.9 are not used for this: a short lease of a participant ends the match only
 /// on the side that was starved, and the outdated acknowledgement count of the other side prevents
 /// its renewal; and liveliness of a topic is renewed by any participant (issue 4373 of Fast DDS).
@@ -53,6 +57,12 @@ class Peers {
   static constexpr std::chrono::milliseconds kQuiet{200};
   /// The same if all servers hear exactly those that were discovered here.
   static constexpr std::chrono::milliseconds kAgreedQuiet{40};
+
+  /// A rival answers within this time, or is not believed.
+  static constexpr std::chrono::seconds kProofWithin{1};
+  /// For another process to take the partition, this one must have been silent for longer
+  /// (Claiming).
+  static constexpr std::chrono::milliseconds kReplaceable{300};
 
   /// @param there  a peer announced what it serves, or is heard again
   /// @param gone   a peer that had announced this, or sent a page, has left or is silent; if it
@@ -70,6 +80,12 @@ class Peers {
     is_server_ = is_server;
   }
 
+  /// From now on this participant serves a partition.
+  void serve(const std::string& partition) {
+    const Lock lock(mutex_);
+    own_ = partition;
+  }
+
   /// A participant that speaks another major version is logged once and otherwise ignored.
   void met(const PeerId& peer, const Announcement& said);
   void left(const ertps::GuidPrefix_t& prefix);
@@ -77,7 +93,8 @@ class Peers {
   void present(const ertps::GuidPrefix_t& prefix, const Presence& presence, std::size_t peers);
   /// A server sent a page, which may arrive before its presence.
   void sent_page(const ertps::GuidPrefix_t& prefix, const Page& page);
-  /// A server has replied: from now on replies reach this participant.
+  /// A server has replied: from now on replies reach this participant. A rival that was asked is
+  /// believed.
   void replied(const ertps::GuidPrefix_t& prefix);
 
   /// Reports the peers that became silent since the last call, and those that are heard again.
@@ -109,6 +126,10 @@ class Peers {
   /// False while replaced() holds for nobody. O(1).
   [[nodiscard]] bool any_replaced() const { return any_overtaken_.load(std::memory_order_relaxed); }
 
+  /// Whether another process may serve this participant's partition since this one could not run:
+  /// then no change may be accepted until that is decided. O(1) while nobody says so.
+  [[nodiscard]] bool may_be_replaced() const;
+
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
   /// announced what they serve, and none hears more others than this participant knows.
   [[nodiscard]] bool discovered() const;
@@ -125,6 +146,10 @@ class Peers {
     Hearing heard{Clock::now()};
     bool silent = false;
     bool overtaken = false;  // a later process has served its partition
+    // It says that it serves the own partition, and has not shown it.
+    std::optional<Clock::time_point> doubted_since;
+    bool asked_for_proof = false;
+    bool proven = false;
 
     [[nodiscard]] const Presence* said() const {
       const bool later = by_page && presence && by_page->incarnation > presence->incarnation;
@@ -137,6 +162,12 @@ class Peers {
   /// Notes which earlier processes of its partition a server takes the place of.
   void overtake(const Presence& later) TFDUDE_REQUIRES(mutex_);
   void hear(Server& server, Clock::time_point at) TFDUDE_REQUIRES(mutex_);
+  /// Reports its presence, unless that has to be shown.
+  void tell(Server& server) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool is_rival(const Server& server) const TFDUDE_REQUIRES(mutex_);
+  /// Reports a rival that did not answer in time as gone. @return whether one must be asked
+  bool ask_rival(Server& server, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  void note_doubts() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
   /// The largest number of servers that one of them hears beyond those known here, and the
   /// smallest: negative if it hears fewer.
@@ -153,6 +184,9 @@ class Peers {
   std::atomic<bool> any_overtaken_{false};
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
+  std::string own_ TFDUDE_GUARDED_BY(mutex_);  // the partition served here; empty: none yet
+  std::atomic<bool> any_doubted_{false};
+  std::optional<Clock::time_point> held_up_ TFDUDE_GUARDED_BY(mutex_);  // for kReplaceable
   // Set once, before anybody is discovered.
   Patience patience_{};
   bool is_server_ = false;

@@ -358,6 +358,31 @@ TEST_CASE("member: it overtakes what others report as soon as no rival serves") 
   CHECK(*outcome.overtook > own);
 }
 
+// Its transport did not believe that process; others may have.
+TEST_CASE("member: it overtakes a later process that was lost before it was heard") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  arms.member.on_lost("arms", own - 1, kNow);
+  CHECK_FALSE(arms.member.take_outcome().overtook);
+  arms.member.on_lost("arms", own + 50, kNow);
+  const Outcome outcome = arms.member.take_outcome();
+  REQUIRE(outcome.overtook);
+  CHECK(*outcome.overtook > own + 50);
+  CHECK(arms.member.given_up().empty());
+}
+
+TEST_CASE("member: at the end of the range of incarnations it keeps its own") {
+  Serving arms;
+  const std::uint64_t own = arms.member.presence().incarnation;
+  Presence head = presence_of("head", 1, 0);
+  head.absent = {{"arms", 1, Absent::Kind::kLost, kLastIncarnation}};
+  for (int i = 0; i < 3; ++i) {
+    arms.member.on_presence(head, kNow);
+    CHECK(arms.member.take_outcome().overtook.has_value() == (i == 0));
+  }
+  CHECK(arms.member.presence().incarnation > own);
+}
+
 // ---- when a name is taken
 
 TEST_CASE("claiming: a free name is taken after the discovery time and then served") {

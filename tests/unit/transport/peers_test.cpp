@@ -100,6 +100,16 @@ TEST_CASE("a peer of another major version is reported and otherwise ignored") {
   CHECK(told == 0);
 }
 
+// The first announcement in its name may have been forged.
+TEST_CASE("a peer that turns out to speak this version is heard") {
+  Observer one;
+  one.peers.met(peer_of(prefix_of(1)), serving("arms", {9, 9}));
+  CHECK(one.peers.is_incompatible(prefix_of(1)));
+  one.peers.met(peer_of(prefix_of(1)), serving("arms"));
+  CHECK_FALSE(one.peers.is_incompatible(prefix_of(1)));
+  CHECK(one.peers.incompatible().empty());
+}
+
 TEST_CASE("a silent peer is replaced once a later process serves its partition") {
   Observer one;
   const auto replaced = [&](unsigned char number) {
@@ -128,6 +138,71 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   // The earlier one was only paused.
   one.peers.present(prefix_of(1), presence_of("arms"), 0);
   CHECK_FALSE(replaced(1));
+}
+
+TEST_CASE("a rival for the own partition is reported once it has answered") {
+  constexpr std::chrono::milliseconds kSoon{300};
+  Observer arms;
+  arms.peers.serve("arms");
+  arms.meet(1, "arms");
+  CHECK(arms.told.empty());
+  CHECK(arms.look(kSoon) > 0);
+  SECTION("it answers") {
+    arms.peers.replied(prefix_of(1));
+    CHECK(arms.told == std::vector<std::string>{"+arms"});
+    CHECK(arms.look(kSoon) == 0);
+    Presence other = presence_of("arms");
+    other.pages = 7;
+    arms.peers.present(prefix_of(1), other, 0);
+    CHECK(arms.told.size() == 2);
+  }
+  SECTION("it does not answer in time") {
+    arms.look(Peers::kProofWithin);
+    CHECK(arms.told == std::vector<std::string>{"-arms"});
+    arms.meet(1, "arms");  // the same again
+    CHECK(arms.look(kSoon) == 0);
+    arms.peers.replied(prefix_of(1));
+    CHECK(arms.told.size() == 2);
+  }
+  SECTION("it leaves") {
+    arms.peers.left(prefix_of(1));
+    CHECK(arms.told == std::vector<std::string>{"-arms"});
+    CHECK(arms.look(kSoon) == 0);
+  }
+}
+
+TEST_CASE("an answer from before a rival was doubted shows nothing") {
+  Observer arms;
+  arms.peers.serve("arms");
+  arms.peers.met(peer_of(prefix_of(1)), serving("arms"));
+  arms.peers.replied(prefix_of(1));
+  arms.peers.present(prefix_of(1), presence_of("arms"), 0);
+  arms.peers.replied(prefix_of(1));  // not asked either
+  CHECK(arms.told.empty());
+}
+
+TEST_CASE("rivals of other partitions, and those that do not serve, are reported at once") {
+  Observer arms;
+  arms.meet(1, "arms");  // this participant does not serve it yet
+  arms.peers.serve("arms");
+  arms.meet(2, "head");
+  Presence claim = presence_of("arms");
+  claim.serving = false;
+  arms.peers.present(prefix_of(3), claim, 0);
+  CHECK(arms.told == std::vector<std::string>{"+arms", "+head", "+arms"});
+}
+
+TEST_CASE("changes wait if a rival appears after this process could not run") {
+  Observer arms;
+  arms.peers.serve("arms");
+  arms.look(std::chrono::milliseconds(300));
+  arms.meet(1, "arms");
+  CHECK_FALSE(arms.peers.may_be_replaced());
+  arms.now += std::chrono::milliseconds(400);
+  (void)arms.peers.look_for_silent(arms.now, std::chrono::milliseconds(30), {});
+  CHECK(arms.peers.may_be_replaced());
+  arms.peers.replied(prefix_of(1));
+  CHECK_FALSE(arms.peers.may_be_replaced());
 }
 
 TEST_CASE("discovery is complete when all peers know as many participants") {
