@@ -122,6 +122,7 @@ json partition_json(const PartitionInfo& partition) {
   if (!partition.program.empty()) object["program"] = partition.program;
   object["protocol"] = to_string(partition.protocol);
   if (partition.clock) object["clock"] = to_string(*partition.clock);
+  if (!partition.complete) object["complete"] = false;
   if (!partition.compatible()) {
     object["reason"] = "incompatible";
   } else if (!partition.reachable) {

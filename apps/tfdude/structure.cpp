@@ -16,8 +16,9 @@ Result<Structure> Structure::of(Source source) {
   if (!frames) return tl::unexpected(std::move(frames.error()));
   auto partitions = source.partitions();
   if (!partitions) return tl::unexpected(std::move(partitions.error()));
-  Structure all{*std::move(frames), {}};
+  Structure all{*std::move(frames), {}, {}};
   for (PartitionInfo& partition : *partitions) {
+    if (!partition.complete) all.incomplete.push_back(partition.name);
     if (!partition.reachable && partition.compatible()) all.absent.push_back(std::move(partition));
   }
   return all;
@@ -40,6 +41,9 @@ std::string Structure::warnings() const {
                  : "its " + std::to_string(count) + " frames are listed as they were last known") +
             "\n";
   }
+  for (const std::string& name : incomplete) {
+    text += "partition " + quote(name) + " has not sent all of its frames: some are missing here\n";
+  }
   return text;
 }
 
@@ -50,7 +54,9 @@ int Structure::print(const Common& common, const std::string& text) const {
     all.push_back(frame_json(frame));
     all.back()["reachable"] = std::count(names.begin(), names.end(), frame.partition) == 0;
   }
-  (void)answer(common, {{"frames", std::move(all)}}, text);
+  nlohmann::json object{{"frames", std::move(all)}};
+  if (!incomplete.empty()) object["incomplete"] = incomplete;
+  (void)answer(common, object, text);
   if (!common.json) std::fputs(warnings().c_str(), stderr);
   return kDone;
 }

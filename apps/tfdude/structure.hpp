@@ -12,7 +12,7 @@ struct Structure {
   [[nodiscard]] static Result<Structure> of(Source source);
 
   [[nodiscard]] std::vector<std::string> absent_names() const;
-  /// A line for each partition that is not reachable.
+  /// A line for each partition that is not reachable, or of which frames are missing.
   [[nodiscard]] std::string warnings() const;
   /// Prints the frames as JSON, or as this text and the warnings to standard error.
   /// @return the exit status
@@ -20,6 +20,7 @@ struct Structure {
 
   std::vector<Frame> frames;
   std::vector<PartitionInfo> absent;
+  std::vector<std::string> incomplete;  ///< partitions of which frames are missing here
 };
 
 }  // namespace tfdude::cli

@@ -54,7 +54,7 @@ TFDUDE_MEMBERS(PartitionInfo, &PartitionInfo::name, &PartitionInfo::host, &Parti
                &PartitionInfo::frames, &PartitionInfo::reachable, &PartitionInfo::since,
                &PartitionInfo::stopped, &PartitionInfo::program, &PartitionInfo::protocol,
                &PartitionInfo::clock, &PartitionInfo::in_memory, &PartitionInfo::why_not_in_memory,
-               &PartitionInfo::silent);
+               &PartitionInfo::silent, &PartitionInfo::complete);
 TFDUDE_MEMBERS(Change, &Change::kind, &Change::partition, &Change::frame, &Change::parent,
                &Change::rival, &Change::message, &Change::time, &Change::stopped, &Change::joint);
 TFDUDE_MEMBERS(HistoryInfo, &HistoryInfo::id, &HistoryInfo::samples, &HistoryInfo::bytes,

@@ -109,7 +109,9 @@ void bind_structure(py::module_& module) {
           "'system', 'external' or None.")
       .def_readonly("in_memory", &PartitionInfo::in_memory, "Whether lookups read its memory.")
       .def_readonly("why_not_in_memory", &PartitionInfo::why_not_in_memory,
-                    "Why they ask it over DDS; empty: they do not.");
+                    "Why they ask it over DDS; empty: they do not.")
+      .def_readonly("complete", &PartitionInfo::complete,
+                    "If reachable: all frames that it has announced have come here.");
   py::class_<Change>(module, "Change", "A change of the structure.")
       .def_property_readonly(
           "kind", [](const Change& change) { return std::string(to_string(change.kind)); },

@@ -168,6 +168,7 @@ void Directory::apply(const Page& page) {
   Owner owner = kHeldHere;
   Known& partition = known(page.partition, owner);
   if (owner == kHeldHere) return;
+  ++pages_heard_;
   // An incarnation that is being replaced still describes the partition.
   const bool current = !partition.pages.empty() && page.incarnation == partition.incarnation;
   if (!current && drop_outdated(partition, page.incarnation)) return;
@@ -388,7 +389,9 @@ std::vector<PartitionInfo> Directory::partitions() const {
   std::vector<PartitionInfo> all;
   if (!partitions_.front().info.name.empty()) all.push_back(partitions_.front().info);
   for (auto one = partitions_.begin() + 1; one != partitions_.end(); ++one) {
-    if (one->listed()) all.push_back(one->info);
+    if (!one->listed()) continue;
+    all.push_back(one->info);
+    all.back().complete = without_pages_ || !one->info.reachable || one->complete();
   }
   std::sort(all.begin(), all.end(),
             [](const PartitionInfo& a, const PartitionInfo& b) { return a.name < b.name; });

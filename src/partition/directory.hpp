@@ -195,6 +195,8 @@ class Directory {
   [[nodiscard]] bool complete() const { return incomplete() == nullptr; }
   /// The name of a reachable partition with missing pages; null: none.
   [[nodiscard]] const std::string* incomplete() const;
+  /// Grows with each page that comes, and with each partition that is there for the first time.
+  [[nodiscard]] std::uint64_t progress() const { return pages_heard_ + partitions_.size(); }
 
   /// An owner has announced a change that its structure shows in this epoch. @return whether it is
   /// the latest
@@ -375,6 +377,7 @@ class Directory {
   std::uint64_t refused_ = 0;
   std::vector<std::string> cut_;
   std::uint64_t version_ = 0;
+  std::uint64_t pages_heard_ = 0;
 };
 
 }  // namespace tfdude

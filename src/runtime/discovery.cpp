@@ -1,6 +1,7 @@
 #include "runtime/discovery.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/time.hpp"
@@ -57,6 +58,32 @@ Result<void> Discovery::await(const Deadline& deadline) {
   }
   while (!complete()) {
     if (deadline.over())
+      return tl::unexpected(undecided({Errc::kTimeout, "not all frames are known"}, deadline));
+    wait_for_change(deadline);
+  }
+  return nobody_but_excluded();
+}
+
+// @param over  the deadline has passed
+bool Discovery::lacks_frames_only(Clock::time_point now, bool over) {
+  const bool met_all = now >= told_by_ || transport_.discovered();
+  const Lock lock(structure_.mutex);
+  const Directory& directory = structure_.directory;
+  const std::uint64_t progress = directory.progress();
+  if (std::exchange(progress_, progress) != progress) progress_at_ = now;
+  const bool silent = over || now - progress_at_ >= kSilentFor;
+  return silent && met_all && directory.behind() == nullptr && directory.incomplete() != nullptr;
+}
+
+Result<void> Discovery::await_known(const Deadline& deadline) {
+  {
+    const Lock lock(structure_.mutex);
+    if (structure_.directory.behind() != nullptr) fell_behind();
+  }
+  while (!complete()) {
+    const bool over = deadline.over();
+    if (lacks_frames_only(Clock::now(), over)) break;
+    if (over)
       return tl::unexpected(undecided({Errc::kTimeout, "not all frames are known"}, deadline));
     wait_for_change(deadline);
   }

@@ -45,6 +45,12 @@ class Discovery {
   /// exclude all partitions that were discovered.
   [[nodiscard]] Result<void> await(const Deadline& deadline);
 
+  /// As await(), but takes what is known if all that is missing are frames that a partition has
+  /// announced, and none has come for kSilentFor, or by the deadline. Then
+  /// PartitionInfo::complete is false.
+  [[nodiscard]] Result<void> await_known(const Deadline& deadline);
+  static constexpr Milliseconds kSilentFor{500};
+
   /// Waits until a partition of this name is known and reachable, or the client ends.
   void wait_for_partition(const std::string& name, const Deadline& deadline);
   /// The client ends: nobody waits for a partition any more, or will. Takes effect within 50 ms.
@@ -64,6 +70,7 @@ class Discovery {
 
  private:
   [[nodiscard]] Result<void> nobody_but_excluded() const;
+  [[nodiscard]] bool lacks_frames_only(Clock::time_point now, bool over);
 
   Structure& structure_;
   const Transport& transport_;
@@ -73,6 +80,9 @@ class Discovery {
   const Clock::time_point told_by_;
   std::atomic<bool> complete_{false};
   std::atomic<bool> ended_{false};
+  // Of Directory::progress(); both under the structure's lock.
+  std::uint64_t progress_ = 0;
+  Clock::time_point progress_at_{};
 };
 
 }  // namespace tfdude

@@ -112,7 +112,8 @@ std::vector<KnownFrame> Queries::frames_before(const FramesRequest& wanted,
 
 Result<std::vector<Frame>> Queries::frames(const Deadline& deadline) {
   if (requests_.on_demand() != nullptr) return followed(deadline);
-  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
+  if (auto all = discovery_.await_known(deadline); !all)
+    return tl::unexpected(std::move(all.error()));
   std::vector<KnownFrame> before = frames_before({{}, {std::string(1, kAnyName)}}, deadline);
   std::vector<FrameInfo> infos = structure_.forest.frames();
   std::vector<Frame> frames;
@@ -169,7 +170,7 @@ Result<std::vector<std::string>> Queries::roots() {
 }
 
 Result<std::vector<PartitionInfo>> Queries::partitions() {
-  if (auto known = discovery_.await(discovery_.call_deadline()); !known) {
+  if (auto known = discovery_.await_known(discovery_.call_deadline()); !known) {
     return tl::unexpected(std::move(known.error()));
   }
   auto partitions = member_.with_rules([](const Member& member) { return member.partitions(); });

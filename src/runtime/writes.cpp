@@ -4,6 +4,8 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/log.hpp"
+#include "base/mutex.hpp"
 #include "calls/hand_over_task.hpp"
 #include "calls/rewrite_task.hpp"
 #include "partition/routing.hpp"
@@ -24,6 +26,14 @@ std::vector<std::string> ids_of(const std::vector<Edge>& edges, const Requests& 
   return ids;
 }
 
+void warn_of_missing(Structure& structure, const std::string& removed) {
+  const Lock lock(structure.mutex);
+  const std::string* partition = structure.directory.incomplete();
+  if (partition == nullptr) return;
+  log().warn("partition {} has not sent all of its frames: those below {} stay, without a parent",
+             quote(*partition), quote(removed));
+}
+
 }  // namespace
 
 Result<void> Writes::add(const std::string& id, const AddRequest& request,
@@ -39,8 +49,9 @@ Result<void> Writes::add(const std::string& id, const AddRequest& request,
 Result<void> Writes::remove(const std::string& id) {
   if (auto ok = requests_.check_keeps_all("remove frame " + quote(id)); !ok) return ok;
   const Deadline deadline = discovery_.call_deadline();
-  // All frames below it are removed by name, so all must be known.
-  if (auto all = discovery_.await(deadline); !all) return all;
+  // All frames below it are removed by name. Those that a partition has announced and not sent
+  // stay, like those of one that is lost.
+  if (auto all = discovery_.await_known(deadline); !all) return all;
   bool asked = false;
   auto removed = requests_.change(deadline, {}, [&](const Directory& directory) {
     auto parts = route_remove(structure_.forest, directory, id);
@@ -48,7 +59,10 @@ Result<void> Writes::remove(const std::string& id) {
     return parts;
   });
   // Missing at a second attempt: the removal has succeeded.
-  if (removed) return removed;
+  if (removed) {
+    warn_of_missing(structure_, id);
+    return removed;
+  }
   const bool is_missing = is_elsewhere(removed.error());
   if (is_missing && asked && !structure_.forest.exists(id)) return {};
   return tl::unexpected(member_.unless_unsaved(std::move(removed.error()), id));

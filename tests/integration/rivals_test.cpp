@@ -88,6 +88,35 @@ TEST_CASE("rivals: a presence of an owned partition does not end its owner") {
   CHECK_FALSE(taken);
 }
 
+// Before, these calls failed for as long as the sender lived.
+TEST_CASE("frames that were announced and never come are missing from lists, which name them") {
+  const testing::DomainLease domain;
+  const Options options = local(domain.number());
+  auto arm = Node::open(transport_of(options, "arm"), "arm",
+                        {{"world", "", {}}, {"hand", "world", {}}}, options);
+  REQUIRE(arm);
+  ForeignWriter leg(domain.number(), "tfdude/presence",
+                    fastdds::edds::TypeSupport(new fastdds::PresenceType), "leg", true);
+  leg.await_readers(1);
+  wire::Presence announced = fastdds::to_wire(Presence{"leg", 1, "tower", 4711, 4000, true});
+  leg.write(&announced);
+  auto client = Client::open(options);
+  REQUIRE(client);
+  REQUIRE(eventually([&] {
+    const auto all = client->partitions();
+    return all && all->size() == 2;
+  }));
+  const auto all = client->partitions();
+  REQUIRE(all);
+  CHECK((*all)[0].complete);
+  CHECK_FALSE((*all)[1].complete);
+  const auto frames = client->frames();
+  REQUIRE(frames);
+  CHECK(frames->size() == 2);
+  CHECK(client->remove("hand"));
+  CHECK(eventually([&] { return !arm->exists("hand"); }));
+}
+
 TEST_CASE("rivals: a page of an owned partition does not end its owner") {
   const testing::DomainLease domain;
   const Options options = local(domain.number());

@@ -44,6 +44,9 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
                       ", this program speaks " + to_string(kProtocolVersion) + "\n");
       continue;
     }
+    if (!partition.complete) {
+      text += painted(Look::kWarning, "  has not sent all of its frames\n");
+    }
     if (partition.clock == ClockKind::kExternal) text += "  external clock\n";
     if (partition.in_memory) text += "  lookups read its memory\n";
     if (!partition.why_not_in_memory.empty() && partition.reachable) {
@@ -80,6 +83,7 @@ struct Partitions final : PlainCommand {
       if (!partition.why_not_in_memory.empty()) {
         json.back()["why_not_in_memory"] = partition.why_not_in_memory;
       }
+      if (!partition.complete) continue;  // whoever sends no frames may not answer, either
       if (const auto histories = client.histories(partition.name)) {
         const HistorySum sum = sum_of(*histories);
         json.back()["moving"] = sum.edges;

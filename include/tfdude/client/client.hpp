@@ -519,7 +519,8 @@ class TFDUDE_EXPORT Client {
   /// @return kTimeout, kUnreachable, kIncompatible, kNotPermitted: nobody can say now.
   [[nodiscard]] Result<bool> whether_exists(const std::string& id);
   /// All frames, sorted by id; also those of partitions that were lost before this process started,
-  /// as an owner of others knows them.
+  /// as an owner of others knows them. Those that a partition has announced and does not send are
+  /// missing: then its PartitionInfo::complete is false.
   [[nodiscard]] Result<std::vector<Frame>> frames();
   /// All partitions, including unreachable ones, sorted by name.
   [[nodiscard]] Result<std::vector<PartitionInfo>> partitions();
