@@ -177,6 +177,9 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   const std::string source = source_ + "." + std::to_string(attempts_);
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
+  if (measurement_.options.independent) {
+    determine_forgotten(plan_, path, measurement_.X_AB, *edges);
+  }
   loosen(plan_, *edges);
   ObservedInstants instants(plan_, path, source);
   instants.name(*edges, !beside_others());

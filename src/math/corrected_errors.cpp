@@ -10,6 +10,7 @@
 
 #include "math/instant_sources.hpp"
 #include "math/joint_covariance.hpp"
+#include "math/joint_update.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
 
@@ -17,6 +18,17 @@ namespace tfdude {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
+
+// Whether the errors of an edge and of any other one have more than a tenth in common along their
+// axes. Less may count as independent.
+bool depends(const JointCovariance& joint, const std::vector<CorrectedError>& edges,
+             std::size_t edge) {
+  constexpr double kLittle = 6 * 0.1 * 0.1;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (k != edge && joint.correlation(edges, edge, k) > kLittle) return true;
+  }
+  return false;
+}
 
 // If more edges are correlated than may be, forgets that of those beside the path which are the
 // least correlated with it.
@@ -37,22 +49,28 @@ void forget_least(const JointPrior& prior, JointCovariance& joint,
     beside.emplace_back(sum, i);
   }
   std::sort(beside.begin(), beside.end());
-  const std::size_t count = std::min(edges.size() - kMaxObservedTogether, beside.size());
-  for (std::size_t k = 0; k < count; ++k) {
-    joint.forget(edges, beside[k].second);
-    edges[beside[k].second].forgotten = true;
+  beside.resize(std::min(edges.size() - kMaxObservedTogether, beside.size()));
+  for (const auto& [sum, i] : beside) edges[i].depends = depends(joint, edges, i);
+  for (const auto& [sum, i] : beside) {
+    joint.forget(edges, i);
+    edges[i].forgotten = true;
   }
 }
 
-void give(const JointCovariance& joint, std::vector<CorrectedError>& edges,
-          const std::string& name) {
-  joint.give(edges, name);
+// What was forgotten shares nothing.
+void clear_forgotten(std::vector<CorrectedError>& edges) {
   for (CorrectedError& edge : edges) {
     if (!edge.forgotten) continue;
     edge.common_errors.erase(
         std::remove_if(edge.common_errors.begin(), edge.common_errors.end(), is_observed),
         edge.common_errors.end());
   }
+}
+
+void give(const JointCovariance& joint, std::vector<CorrectedError>& edges,
+          const std::string& name) {
+  joint.give(edges, name);
+  clear_forgotten(edges);
 }
 
 // The errors of sources at instants. They stay apart from what observations have found, as it is
@@ -122,6 +140,55 @@ void carry(const JointPrior::Source& source, const std::vector<Loading>& loading
   }
 }
 
+// F - K C, the loadings of a source after a measurement.
+std::vector<Loading> lessened(const JointPrior::Source& source, const std::vector<Matrix6d>& gains,
+                              const JointPrior& prior, const std::vector<Matrix6d>& H) {
+  const Loading on_path = source.on_path(prior, H);
+  std::vector<Loading> loadings = source.loadings;
+  for (std::size_t i = 0; i < loadings.size(); ++i) loadings[i] -= gains[i] * on_path;
+  return loadings;
+}
+
+// Whether a source is of columns that observations have left.
+bool is_left(const JointPrior::Source& source) {
+  return is_observed({source.name, false, {}}) && said_source(source.name).empty();
+}
+
+// How many there are; zero: few, or some that subtract.
+Eigen::Index many_columns(const JointPrior& prior) {
+  Eigen::Index count = 0;
+  for (const JointPrior::Source& source : prior.sources()) {
+    if (!is_left(source)) continue;
+    if (source.subtracts) return 0;
+    count += source.loadings.front().cols();
+  }
+  return count > kMaxLoadingColumns ? count : 0;
+}
+
+// Those of all edges, 6n x count.
+Matrix columns_of(const JointPrior& prior, Eigen::Index count) {
+  Matrix all(6 * static_cast<Eigen::Index>(prior.edges().size()), count);
+  Eigen::Index first = 0;
+  for (const JointPrior::Source& source : prior.sources()) {
+    if (!is_left(source)) continue;
+    const Eigen::Index columns = source.loadings.front().cols();
+    Eigen::Index row = 0;
+    for (const Loading& loading : source.loadings) {
+      all.block(row, first, 6, columns) = loading;
+      row += 6;
+    }
+    first += columns;
+  }
+  return all;
+}
+
+void give_many(const JointPrior& prior, JointCovariance& joint, Eigen::Index before,
+               const std::string& name, std::vector<CorrectedError>& edges) {
+  forget_least(prior, joint, edges);
+  joint.give_many(edges, name, before);
+  clear_forgotten(edges);
+}
+
 // N Wᵀ, with N = own Hᵀ.
 Loading own_seen(const JointPrior& prior, std::size_t i, const Matrix6d& H, const Factor& factor) {
   const Loading on_path = H * prior.own_roots()[i];
@@ -182,7 +249,7 @@ std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearP
   const Matrix6d K = own_seen(prior, edge, H, S) * S.whitening();
   const Loading rest = updated_root(own, seen, R, S);
   std::vector<CorrectedError> corrected;
-  for (const Matrix6d& one : prior.own()) corrected.push_back({one, {}, false});
+  for (const Matrix6d& one : prior.own()) corrected.push_back({one, {}});
   corrected[edge].own = rest * rest.transpose();
   auto beside = linear.H;
   beside[prior.edges()[edge]].setZero();
@@ -196,6 +263,75 @@ std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearP
   return corrected;
 }
 
+// The update of many columns, which all add. Sources that are not estimated leave six more.
+std::vector<CorrectedError> corrected_many(const JointPrior& prior, const LinearPath& linear,
+                                           const Loading& R, Eigen::Index before,
+                                           const std::string& new_source) {
+  const std::size_t count = prior.edges().size();
+  std::vector<Matrix6d> H;
+  for (const std::size_t k : prior.edges()) H.push_back(linear.H[k]);
+  const Twist rounding = rounding_of_pose(linear.reach);
+  const Loading noise = compressed(joined(R, Matrix6d(rounding.asDiagonal())));
+  MeasuredJoint found = measured_joint(prior.own_roots(), columns_of(prior, before), H, noise);
+  std::vector<CorrectedError> corrected;
+  for (const Matrix6d& own : found.own) corrected.push_back({own, {}});
+  JointCovariance observed(count);
+  observed.append(found.F);
+  Left left{JointCovariance(count), {}};
+  const bool others = !std::all_of(prior.sources().begin(), prior.sources().end(), is_left);
+  if (others) {
+    const Factor S(joined(prior.path(linear.H), R), rounding);
+    const auto with_path = prior.with_path(linear.H, S.whitening());
+    const auto root = found.seen.topRows<6>();
+    Matrix more(found.F.rows(), root.cols());
+    std::vector<Matrix6d> gains;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto row = 6 * static_cast<Eigen::Index>(i);
+      gains.emplace_back(with_path[i] * S.whitening());
+      more.middleRows<6>(row) = gains[i] * root - found.seen.middleRows<6>(6 + row);
+    }
+    observed.append(more);
+    for (const JointPrior::Source& source : prior.sources()) {
+      if (!is_left(source))
+        carry(source, lessened(source, gains, prior, linear.H), &left, corrected);
+    }
+  }
+  give_many(prior, observed, before, new_source, corrected);
+  left.of_instants.give(corrected, new_source);
+  return corrected;
+}
+
+// As determined_errors(), if there are many columns, which all add: those of the edge follow from
+// them.
+std::vector<CorrectedError> determined_many(const JointPrior& prior, const LinearPath& linear,
+                                            const Matrix6d& G, const Loading& noise,
+                                            Eigen::Index before, const std::string& new_source) {
+  const std::size_t count = prior.edges().size();
+  std::vector<CorrectedError> determined;
+  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
+  determined.push_back({noise * noise.transpose(), {}});
+  Left left{JointCovariance(determined.size()), {}};
+  JointCovariance& observed = left.observed;
+  for (const JointPrior::Source& source : prior.sources()) {
+    std::vector<Loading> loadings = source.loadings;
+    loadings.emplace_back(-G * source.on_path(prior, linear.H));
+    carry(source, loadings, &left, determined);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Matrix6d& H = linear.H[prior.edges()[i]];
+    const Loading& root = prior.own_roots()[i];
+    if (H.isZero(0) || root.cols() == 0) continue;
+    std::vector<Loading> loadings(count + 1, Loading::Zero(6, root.cols()));
+    loadings[i] = root;
+    loadings[count] = -G * H * root;
+    observed.append(loadings, false);
+    determined[i].own.setZero();
+  }
+  give_many(prior, observed, before, new_source, determined);
+  left.of_instants.give(determined, new_source);
+  return determined;
+}
+
 }  // namespace
 
 std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const LinearPath& linear,
@@ -203,6 +339,9 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
                                              bool merge) {
   const auto& edges = prior.edges();
   const auto& H = linear.H;
+  const bool alone = edges.size() == 1;
+  const Eigen::Index many = merge && !alone ? many_columns(prior) : 0;
+  if (many > 0) return corrected_many(prior, linear, R, many, new_source);
   const Twist rounding = rounding_of_pose(linear.reach);
   const Factor S(joined(prior.path(H), R), rounding);
   const auto with_path = prior.with_path(H, S.whitening());
@@ -210,9 +349,8 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
   std::vector<CorrectedError> corrected;
   for (std::size_t i = 0; i < edges.size(); ++i) {
     gains.emplace_back(with_path[i] * S.whitening());
-    corrected.push_back({prior.own()[i], {}, false});
+    corrected.push_back({prior.own()[i], {}});
   }
-  const bool alone = edges.size() == 1;
   if (alone) {
     // Others are correlated with it through common errors only: the rest is its own.
     const Loading& own = prior.own_roots()[0];
@@ -224,10 +362,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
   Left left{JointCovariance(edges.size()), {}};
   JointCovariance& observed = left.observed;
   for (const JointPrior::Source& source : prior.sources()) {
-    const Loading on_path = source.on_path(prior, H);
-    std::vector<Loading> loadings = source.loadings;
-    for (std::size_t i = 0; i < edges.size(); ++i) loadings[i] -= gains[i] * on_path;
-    carry(source, loadings, alone || !merge ? nullptr : &left, corrected);
+    carry(source, lessened(source, gains, prior, H), alone || !merge ? nullptr : &left, corrected);
   }
   if (alone) return corrected;
   if (const auto edge = dominant(prior, H, R, S)) {
@@ -252,10 +387,13 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
                                               const LinearPath& linear, const Loading& R,
                                               const std::string& new_source, bool merge) {
   const Matrix6d G = linear.H[u].inverse();
+  if (const Eigen::Index many = merge ? many_columns(prior) : 0; many > 0) {
+    return determined_many(prior, linear, G, G * R, many, new_source);
+  }
   std::vector<CorrectedError> determined;
-  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}, false});
+  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
   const Loading noise = G * R;
-  determined.push_back({noise * noise.transpose(), {}, false});
+  determined.push_back({noise * noise.transpose(), {}});
   Left left{JointCovariance(determined.size()), {}};
   JointCovariance& observed = left.observed;
   for (const JointPrior::Source& source : prior.sources()) {

@@ -12,6 +12,7 @@ struct CorrectedError {
   Matrix6d own;
   std::vector<CommonError> common_errors;
   bool forgotten = false;  ///< how it was correlated with the others
+  bool depends = false;    ///< it was, so much that it cannot count as independent
 };
 
 /// The joint covariance after a measurement, P - P Hᵀ S⁻¹ H P, as own parts and common

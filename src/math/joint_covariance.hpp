@@ -35,6 +35,15 @@ class JointCovariance {
     signs_.tail(more).setConstant(subtracts ? -1.0 : 1.0);
   }
 
+  // Columns that add.
+  void append(const Eigen::MatrixXd& more) {
+    const Eigen::Index first = columns_.cols();
+    columns_.conservativeResize(Eigen::NoChange, first + more.cols());
+    columns_.rightCols(more.cols()) = more;
+    signs_.conservativeResize(first + more.cols());
+    signs_.tail(more.cols()).setOnes();
+  }
+
   // Makes the errors of an edge independent of all others.
   void forget(std::vector<CorrectedError>& edges, std::size_t edge) {
     auto rows = columns_.middleRows(6 * static_cast<Eigen::Index>(edge), 6);
@@ -62,24 +71,46 @@ class JointCovariance {
   [[nodiscard]] bool empty() const { return columns_.cols() == 0; }
 
   // Writes the same joint covariance with few columns, as common errors of new sources. All edges
-  // that share the sources are here. Columns with signs keep the most digits, so they are kept
-  // while there are few.
+  // that share the sources are here. While there are few, some may subtract.
   void give(std::vector<CorrectedError>& edges, const std::string& name) const {
-    const Signed own = with_signs();
-    const Eigen::Index count = own.less.cols() + own.more.cols();
-    if (count <= kMaxLoadingColumns) return give_with_signs(edges, {name, {}}, own);
-    auto hubs = by_hubs(dense(edges), rounding(edges), std::min(count, kMostColumns));
-    if (!hubs) return give_with_signs(edges, {name, {}}, own);
-    for (std::size_t i = 0; i < edges.size(); ++i) {
-      edges[i].own = hubs->own.middleRows(6 * static_cast<Eigen::Index>(i), 6);
+    Eigen::Index count = columns_.cols();
+    if (count <= kMostOfHubs) {
+      const Signed own = with_signs();
+      count = own.less.cols() + own.more.cols();
+      if (count <= kMaxLoadingColumns) return add_signed(edges, {name, {}}, own);
     }
-    add_common(edges, {name, {}}, hubs->F, false);
+    const Eigen::MatrixXd P = dense(edges);
+    if (give_by_hubs(edges, name, P, count)) return;
+    for (CorrectedError& edge : edges) edge.own.setZero();
+    add_common(edges, {name, {}}, root_of_joint(P), false);
   }
 
-  // The same for errors of a source at some instants, which stay apart.
+  // The same for many columns that all add.
+  // @param before  how many there were before the observation. To look for fewer takes longer than
+  //   the observation, so it is done when they have doubled, or are many more than rows
+  void give_many(std::vector<CorrectedError>& edges, const std::string& name,
+                 Eigen::Index before) const {
+    const auto doubled = [](Eigen::Index count) { return std::ilogb(count / kMaxLoadingColumns); };
+    const Eigen::Index count = columns_.cols();
+    const bool too_many =
+        count > columns_.rows() + std::max(kMaxLoadingColumns, columns_.rows() / 8);
+    const bool fewer = too_many || doubled(count) > doubled(std::max(before, kMaxLoadingColumns));
+    if (fewer && give_by_hubs(edges, name, dense(edges), count / 2)) return;
+    add_common(edges, {name, {}}, too_many ? triangle_of_columns(columns_) : columns_, false);
+  }
+
+  // The same for errors of a source at some instants, which stay apart. None subtracts. Those
+  // beyond the maximum go to the own parts: no correlation of n parts exceeds n times their sum.
   void give_of(std::vector<CorrectedError>& edges, const std::string& name,
                const std::string& said) const {
-    give_with_signs(edges, {name, said}, with_signs());
+    const Eigen::MatrixXd more = with_signs().more;
+    for (Eigen::Index k = kMostOfInstants; k < more.cols(); ++k) {
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        const Twist part = more.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
+        edges[i].own += static_cast<double>(edges.size()) * part * part.transpose();
+      }
+    }
+    add_common(edges, {name, said}, more.leftCols(std::min(more.cols(), kMostOfInstants)), false);
   }
 
  private:
@@ -87,8 +118,9 @@ class JointCovariance {
     const std::string& observation;
     std::string said;  // empty: no source
   };
-  // Of all sources together.
-  static constexpr Eigen::Index kMostColumns = 4 * kMaxLoadingColumns;
+  // More blocks on which all others depend are not looked for.
+  static constexpr Eigen::Index kMostOfHubs = 4 * kMaxLoadingColumns;
+  static constexpr Eigen::Index kMostOfInstants = 4 * kMaxLoadingColumns;
   // Of the sum of what is subtracted from each other.
   static constexpr double kRounding = 1e-14;
 
@@ -123,19 +155,22 @@ class JointCovariance {
     return found;
   }
 
-  // Columns beyond the maximum that subtract may be dropped. Those that add go to the own parts: no
-  // correlation of n parts exceeds n times their sum.
-  static void give_with_signs(std::vector<CorrectedError>& edges, const Name& name,
-                              const Signed& columns) {
-    const auto& [less, more] = columns;
-    for (Eigen::Index k = kMostColumns; k < more.cols(); ++k) {
-      for (std::size_t i = 0; i < edges.size(); ++i) {
-        const Twist part = more.col(k).segment<6>(6 * static_cast<Eigen::Index>(i));
-        edges[i].own += static_cast<double>(edges.size()) * part * part.transpose();
-      }
+  static void add_signed(std::vector<CorrectedError>& edges, const Name& name,
+                         const Signed& columns) {
+    add_common(edges, name, columns.less, true);
+    add_common(edges, name, columns.more, false);
+  }
+
+  // @return whether fewer columns than `count` suffice
+  bool give_by_hubs(std::vector<CorrectedError>& edges, const std::string& name,
+                    const Eigen::MatrixXd& P, Eigen::Index count) const {
+    const auto hubs = by_hubs(P, rounding(edges), std::min(count, kMostOfHubs));
+    if (!hubs) return false;
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      edges[i].own = hubs->own.middleRows(6 * static_cast<Eigen::Index>(i), 6);
     }
-    add_common(edges, name, less.leftCols(std::min(less.cols(), kMostColumns)), true);
-    add_common(edges, name, more.leftCols(std::min(more.cols(), kMostColumns)), false);
+    add_common(edges, {name, {}}, hubs->F, false);
+    return true;
   }
 
   // All edges get the first source, by which others see that it is the same observation.

@@ -22,7 +22,10 @@ JointPrior::Source& source_of(std::vector<JointPrior::Source>& sources,
 
 Loading JointPrior::Source::on_path(const JointPrior& prior, const std::vector<Matrix6d>& H) const {
   Loading sum = Loading::Zero(6, loadings.front().cols());
-  for (std::size_t i = 0; i < loadings.size(); ++i) sum += H[prior.edges_[i]] * loadings[i];
+  for (std::size_t i = 0; i < loadings.size(); ++i) {
+    const Matrix6d& H_i = H[prior.edges_[i]];
+    if (!H_i.isZero(0)) sum.noalias() += H_i * loadings[i];  // most are beside the path
+  }
   return sum;
 }
 
@@ -79,6 +82,16 @@ Loading JointPrior::marginal(std::size_t i) const {
   return root_of_difference(adds, subtracts);
 }
 
+Twist JointPrior::deviations(std::size_t i) const {
+  const auto subtracts = [](const Source& source) { return source.subtracts; };
+  if (std::any_of(sources_.begin(), sources_.end(), subtracts)) {
+    return marginal(i).rowwise().norm();
+  }
+  Twist sum = own_roots_[i].rowwise().squaredNorm();
+  for (const Source& source : sources_) sum += source.loadings[i].rowwise().squaredNorm();
+  return sum.cwiseSqrt();
+}
+
 Loading JointPrior::own_on_path(const std::vector<Matrix6d>& H) const {
   Loading columns(6, 0);
   for (std::size_t i = 0; i < edges_.size(); ++i) {
@@ -112,6 +125,16 @@ std::vector<Loading> JointPrior::with_path(const std::vector<Matrix6d>& H,
     }
   }
   return with_path;
+}
+
+Loading JointPrior::with_path(const std::vector<Matrix6d>& H, const Whitening& W,
+                              std::size_t i) const {
+  const Loading on_path = H[edges_[i]] * own_roots_[i];
+  Loading sum = own_roots_[i] * (W * on_path).transpose();
+  for (const Source& source : sources_) {
+    sum += source.sign() * source.loadings[i] * (W * source.on_path(*this, H)).transpose();
+  }
+  return sum;
 }
 
 Deviations JointPrior::most_probable(const std::vector<Matrix6d>& H, const Whitening& W,
@@ -148,6 +171,7 @@ double JointPrior::cost(const Deviations& deviations) const {
 }
 
 void JointPrior::widen(double by) {
+  if (by == 1.0) return;
   for (Matrix6d& own : own_) own *= by;
   for (Loading& root : own_roots_) root *= std::sqrt(by);
   for (Source& source : sources_) {

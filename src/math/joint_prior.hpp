@@ -62,6 +62,8 @@ class JointPrior {
 
   /// A root of P_ii.
   [[nodiscard]] Loading marginal(std::size_t i) const;
+  /// Standard deviations of the edge.
+  [[nodiscard]] Twist deviations(std::size_t i) const;
 
   /// A root of H P Hᵀ. @param H  one per edge, for all edges
   [[nodiscard]] Loading path(const std::vector<Matrix6d>& H) const;
@@ -70,6 +72,9 @@ class JointPrior {
   /// P Hᵀ Wᵀ by edge. What is whitened keeps its digits over long levers.
   [[nodiscard]] std::vector<Loading> with_path(const std::vector<Matrix6d>& H,
                                                const Whitening& W) const;
+  /// That of one edge.
+  [[nodiscard]] Loading with_path(const std::vector<Matrix6d>& H, const Whitening& W,
+                                  std::size_t i) const;
 
   /// The most probable error if the whitened path shows y: P Hᵀ Wᵀ y.
   [[nodiscard]] Deviations most_probable(const std::vector<Matrix6d>& H, const Whitening& W,

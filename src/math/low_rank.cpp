@@ -5,7 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 
 namespace tfdude {
 namespace {
@@ -21,6 +23,9 @@ constexpr double kNone = 1e-11;
 
 // Eigenvalues of a correlation matrix below this are zero.
 constexpr double kSingular = 1e-12;
+
+// Pivots of a correlation matrix below this are rounding.
+constexpr double kPivotRounding = 1e-15;
 
 // Coordinates of a block in which its covariance is one, or zero where it is known exactly. Scaled
 // to correlations first, as metres and radians differ.
@@ -111,6 +116,29 @@ class Hubs {
 std::optional<BlocksAndColumns> by_hubs(Matrix P, const Eigen::VectorXd& rounding,
                                         Eigen::Index most_columns) {
   return Hubs(std::move(P), rounding).run(most_columns);
+}
+
+Eigen::MatrixXd root_of_joint(const Eigen::MatrixXd& P) {
+  const Eigen::VectorXd size = P.diagonal().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::VectorXd unit = size.unaryExpr([](double one) { return one > 0 ? 1.0 / one : 0.0; });
+  const Eigen::LDLT<Matrix> factor(unit.asDiagonal() * P * unit.asDiagonal());
+  const Eigen::VectorXd pivots = factor.vectorD();
+  Matrix L = factor.matrixL();
+  Eigen::Index rank = 0;
+  for (Eigen::Index k = 0; k < pivots.size(); ++k) {
+    if (!(pivots[k] > kPivotRounding)) continue;
+    L.col(rank) = L.col(k) * std::sqrt(pivots[k]);
+    ++rank;
+  }
+  const Matrix F = factor.transpositionsP().transpose() * L.leftCols(rank);
+  return size.asDiagonal() * F;
+}
+
+Eigen::MatrixXd triangle_of_columns(const Eigen::MatrixXd& F) {
+  if (F.cols() <= F.rows()) return F;
+  const Eigen::HouseholderQR<Matrix> qr(F.transpose());
+  const Matrix upper = qr.matrixQR().topRows(F.rows()).triangularView<Eigen::Upper>();
+  return upper.transpose();
 }
 
 }  // namespace tfdude

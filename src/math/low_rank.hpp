@@ -26,4 +26,13 @@ struct BlocksAndColumns {
                                                       const Eigen::VectorXd& rounding,
                                                       Eigen::Index most_columns);
 
+/// Columns whose sum of squares is a joint covariance, F Fᵀ = P, as many as P has rank.
+/// Each row is scaled by its own deviation before. O(n³).
+/// @param P  6n x 6n
+[[nodiscard]] Eigen::MatrixXd root_of_joint(const Eigen::MatrixXd& P);
+
+/// Columns with the same F Fᵀ, no more than there are rows. The error of each row is relative to
+/// that row. O(n² · columns).
+[[nodiscard]] Eigen::MatrixXd triangle_of_columns(const Eigen::MatrixXd& F);
+
 }  // namespace tfdude

@@ -29,6 +29,11 @@ Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
   return Covariance::trusted(nearest_semidefinite(H * sigma * H.transpose()));
 }
 
+void forget(const CorrectedError& error, ObservedResult& result) {
+  result.forgotten = error.forgotten;
+  if (error.depends) result.X_PC.unknown = std::exchange(result.X_PC.own, {});
+}
+
 // An observation in progress.
 class Update {
  public:
@@ -55,14 +60,13 @@ class Update {
     }
     Observation observation;
     judge(found, observation);
-    for (const ObservedEdge& edge : all_)
-      observation.edges.push_back({edge.X_PC, false, false, {}});
+    observation.edges.resize(all_.size());
     if (independent_) note_innovation(found, observation);
-    if (!observation.accepted) return observation;
+    if (!observation.accepted) return with_unchanged(std::move(observation));
     BoundWeights weights{1.0, 1.0};
     if (!independent_) {
       const auto omega = weight();
-      if (!omega) return observation;
+      if (!omega) return with_unchanged(std::move(observation));
       weights = {1.0 / *omega, 1.0 / (1.0 - *omega)};
       found = minimum(weights);
     }
@@ -71,13 +75,21 @@ class Update {
                   "the measurement lies too far from where the path is, towards half a turn");
     }
     apply(found, weights, observation);
-    return observation;
+    return with_unchanged(std::move(observation));
   }
 
  private:
   // As often as the rotation of the path may be found anew, about axes of which the measurement
   // says nothing.
   static constexpr int kMostTurns = 5;
+
+  // Edges that are not corrected stay as they are.
+  [[nodiscard]] Observation with_unchanged(Observation observation) const {
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      if (!observation.edges[k].corrected) observation.edges[k].X_PC = all_[k].X_PC;
+    }
+    return observation;
+  }
 
   [[nodiscard]] PathMinimum first_minimum() const {
     return independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
@@ -134,6 +146,7 @@ class Update {
 
   // With P and R by these factors.
   [[nodiscard]] PathMinimum minimum(const BoundWeights& weights) const {
+    if (weights.of_A == 1.0) return minimize(all_, prior_, Z_AB_, noise(weights));
     JointPrior prior = prior_;
     prior.widen(weights.of_A);
     return minimize(all_, prior, Z_AB_, noise(weights));
@@ -156,13 +169,13 @@ class Update {
 
   // Records the corrections that this observation alone would make.
   void note_innovation(const PathMinimum& found, Observation& observation) const {
-    const auto with_path = prior_.with_path(found.linear.H, found.S.whitening());
-    const Eigen::VectorXd seen = found.S.whitening() * found.seen;
+    const Whitening& W = found.S.whitening();
+    const Eigen::VectorXd seen = W * found.seen;
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       if (all_[prior_.edges()[i]].way == ObservedEdge::Way::kBeside) continue;
       // In deviations of the edge, by those of the innovation.
       const Factor edge(prior_.marginal(i));
-      const Eigen::MatrixXd gain = edge.whitening() * with_path[i];
+      const Eigen::MatrixXd gain = edge.whitening() * prior_.with_path(found.linear.H, W, i);
       const Eigen::MatrixXd share = gain.transpose() * gain;
       observation.edges[prior_.edges()[i]].innovation = {(gain * seen).squaredNorm(), share.trace(),
                                                          2.0 * share.squaredNorm()};
@@ -198,20 +211,22 @@ class Update {
 
   void apply(const PathMinimum& found, const BoundWeights& weights, Observation& observation) {
     prior_.widen(weights.of_A);
-    const auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_, merge_);
+    auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_, merge_);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
       // The error now refers to another pose.
       const Matrix6d J = right_jacobian(found.xi[k]);
       const Covariance own = seen(J, corrected[i].own);
+      const Belief& before = all_[k].X_PC;
+      result.X_PC = {
+          before.pose * exp(found.xi[k]), before.own, before.unknown, {}, before.unspecified};
       (prior_.is_of_unknown() ? result.X_PC.unknown.emplace() : result.X_PC.own) = own;
-      result.X_PC.pose = result.X_PC.pose * exp(found.xi[k]);
-      result.X_PC.common_errors = corrected[i].common_errors;
+      result.X_PC.common_errors = std::move(corrected[i].common_errors);
       for (CommonError& error : result.X_PC.common_errors)
         error.loading = (J * error.loading).eval();
       result.corrected = true;
-      result.forgotten = corrected[i].forgotten;
+      forget(corrected[i], result);
     }
   }
 
@@ -278,7 +293,7 @@ class Unspecified {
       found.edges[k].X_PC.own = Covariance::trusted(nearest_semidefinite(error.own));
       found.edges[k].X_PC.common_errors = error.common_errors;
       found.edges[k].corrected = true;
-      found.edges[k].forgotten = error.forgotten;
+      forget(error, found.edges[k]);
     };
     put(index_, determined.back());
     for (std::size_t i = 0; i < others.edges().size(); ++i) {
@@ -344,6 +359,21 @@ Result<Observation> observed(const std::vector<ObservedEdge>& edges, const Trans
 Result<Observation> observe(const std::vector<ObservedEdge>& edges, const Transform& Z_AB,
                             const std::string& source, const ObserveOptions& options) {
   return observed(edges, Z_AB, source, options, true);
+}
+
+bool is_better_anew(const std::vector<ObservedEdge>& edges, std::size_t index,
+                    const Transform& Z_AB) {
+  // How many times its variance it may have then, as it is tied to the rest of the path again.
+  constexpr double kMost = 4.0;
+  std::vector<ObservedEdge> others = edges;
+  others[index].X_PC = {edges[index].X_PC.pose, {}, std::nullopt, {}};
+  const LinearPath linear =
+      linearize(others, std::vector<Twist>(others.size(), Twist::Zero()), Z_AB.pose);
+  const Loading seen =
+      joined(JointPrior(others).path(linear.H), root_of(Z_AB.covariance.of_specified().matrix()));
+  const Twist anew = (linear.H[index].inverse() * seen).rowwise().squaredNorm();
+  const Twist before = edges[index].X_PC.unknown.value_or(Covariance()).matrix().diagonal();
+  return units_of(before).dot(anew) <= kMost * units_of(before).dot(before);
 }
 
 Result<Observation> observe_beside_others(const std::vector<ObservedEdge>& edges,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -13,5 +14,11 @@ namespace tfdude {
                                                         const Transform& Z_AB,
                                                         const std::string& source,
                                                         const ObserveOptions& options);
+
+/// Whether an edge of the path, of which it is not known how it is correlated with the others, may
+/// be determined by the measurement as if nothing was known of it: it does not become much less
+/// certain by that, and what was measured is known again.
+[[nodiscard]] bool is_better_anew(const std::vector<ObservedEdge>& edges, std::size_t index,
+                                  const Transform& Z_AB);
 
 }  // namespace tfdude

@@ -180,7 +180,7 @@ class Descent {
   [[nodiscard]] bool is_small(const EdgeErrors& next) {
     if (deviations_.empty()) {
       for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
-        deviations_.emplace_back(prior_.marginal(i).rowwise().norm());
+        deviations_.push_back(prior_.deviations(i));
       }
     }
     const Twist hidden = rounding_of_pose(linear_.reach);

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <string_view>
+#include <unordered_set>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
 
 #include "base/stamp.hpp"
 #include "math/instant_sources.hpp"
+#include "math/observe_beside.hpp"
 
 namespace tfdude {
 namespace {
@@ -68,15 +71,16 @@ void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t 
   });
   if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) return;
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
-    const std::string& id = plan.edges[k].info.id;
-    if (std::count(with.begin(), with.end(), id) != 1) continue;
-    if (is_moving(id, path.correlations[k])) continue;
-    if (std::count(lacking.begin(), lacking.end(), id) > 0) continue;
     const auto& common_errors = path.edges[k].X_PC.common_errors;
     const auto same = [&](const CommonError& common_error) {
       return common_error.source == source->source;
     };
-    if (std::none_of(common_errors.begin(), common_errors.end(), same)) lacking.push_back(id);
+    // Most have it, so the others are counted afterwards.
+    if (std::any_of(common_errors.begin(), common_errors.end(), same)) continue;
+    const std::string& id = plan.edges[k].info.id;
+    if (std::count(with.begin(), with.end(), id) != 1) continue;
+    if (is_moving(id, path.correlations[k])) continue;
+    if (std::count(lacking.begin(), lacking.end(), id) == 0) lacking.push_back(id);
   }
 }
 
@@ -96,7 +100,7 @@ void add_rows(const std::vector<RowOfSample>& rows, const Edge& edge, std::size_
       path.rows[k].stamp = row.stamp;
     } else {
       path.edges.push_back({X_PC, Way::kBeside});
-      path.correlations.push_back(row.correlation);
+      path.correlations.push_back({row.correlation.unknown, {}, row.correlation.observed_with});
       path.rows.push_back({k, row.stamp});
     }
     first = false;
@@ -106,6 +110,20 @@ void add_rows(const std::vector<RowOfSample>& rows, const Edge& edge, std::size_
 // Whether the edge was observed on the path before all instants that are kept of it.
 bool precedes_rows(const ObservedEdge& edge) {
   return edge.way != Way::kBeside && edge.X_PC.unknown && was_observed(edge.X_PC);
+}
+
+// Whether it is not known any more how a static edge is correlated with others, as it was observed
+// with too many. It lists itself alone.
+bool was_forgotten(const std::string& id, const ObservedEdge& edge,
+                   const PathCorrelation& correlation) {
+  const auto& with = correlation.observed_with;
+  return edge.X_PC.unknown && !was_observed(edge.X_PC) && with.size() == 1 && with.front() == id;
+}
+
+// The same of a dynamic edge is a matter of the present sample.
+void keep_forgotten(const std::string& id, bool moving, Revision& revision) {
+  if (moving) revision.correlation.unknown = false;
+  if (revision.correlation.unknown) revision.correlation.observed_with = {id};
 }
 
 void widen(Belief& X, double by) {
@@ -266,14 +284,14 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
     path.seen.push_back({answers[i].commit, answers[i].incarnation, answers[i].stamp});
     if (i < plan.path_parts && answers[i].stamp) path.stamp = answers[i].stamp;
   }
+  std::unordered_set<std::string_view> known;
+  for (const Edge& edge : plan.edges) known.insert(edge.info.id);
   for (const Edge& edge : plan.edges) {
     const PathCorrelation& correlation = answers[edge.part].correlations[edge.index];
     path.edges.push_back({belief_of(answers[edge.part].values[edge.index], correlation), edge.way});
-    path.correlations.push_back(correlation);
+    path.correlations.push_back({correlation.unknown, {}, correlation.observed_with});
     for (const std::string& id : correlation.observed_with) {
-      const bool known =
-          has(plan.edges, id) || std::count(path.missing.begin(), path.missing.end(), id) != 0;
-      if (!known) path.missing.push_back(id);
+      if (known.insert(id).second) path.missing.push_back(id);
     }
   }
   for (std::size_t k = 0; k < plan.edges.size(); ++k) path.rows.push_back({k, {}});
@@ -297,6 +315,21 @@ void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges) {
     X.own = Covariance::trusted(Matrix6d((1 + 1 / kMore) * X.unknown->matrix()));
     X.unknown.reset();
   }
+}
+
+void determine_forgotten(const ObservePlan& plan, const ObservedPath& path, const Transform& Z_AB,
+                         std::vector<ObservedEdge>& edges) {
+  std::optional<std::size_t> forgotten;
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) {
+    if (edges[k].way == Way::kBeside) continue;
+    if (edges[k].X_PC.unspecified) return;
+    if (!edges[k].X_PC.unknown) continue;
+    if (forgotten || !was_forgotten(plan.edges[k].info.id, edges[k], path.correlations[k])) return;
+    forgotten = k;
+  }
+  if (!forgotten || !is_better_anew(edges, *forgotten, Z_AB)) return;
+  edges[*forgotten].X_PC.unspecified = true;
+  edges[*forgotten].X_PC.unknown.reset();
 }
 
 std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
@@ -335,6 +368,9 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
       edge.revision = Revision{
           edge.id, {X.pose, stored_part(X)}, correlation_of(edge.id, X, together), row.stamp};
       edge.revision->X_PC.covariance.set_complete(!X.unspecified);
+      if (result.forgotten) {
+        keep_forgotten(edge.id, is_moving(edge.id, path.correlations[k]), *edge.revision);
+      }
     }
     revision_of(plan, path, row.edge, parts).edges.push_back(std::move(edge));
   }

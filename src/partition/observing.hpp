@@ -32,8 +32,9 @@ struct ObservePlan {
 /// The plan with the values of all edges: those of the path at one instant, those beside it at
 /// their newest.
 struct ObservedPath {
-  std::vector<ObservedEdge> edges;            ///< those of the plan, then further rows of these
-  std::vector<PathCorrelation> correlations;  ///< as their owners store them
+  std::vector<ObservedEdge> edges;  ///< those of the plan, then further rows of these
+  /// As their owners store them, without the common errors, which the edges have.
+  std::vector<PathCorrelation> correlations;
   /// An edge that drifts is corrected at several instants (RowOfSample).
   struct Row {
     std::size_t edge = 0;         ///< of the plan
@@ -72,6 +73,11 @@ struct ObservedPath {
 /// count a little more. That is enough for any correlation, and ties the edge to the others.
 /// @param edges  those of the path
 void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges);
+
+/// Has an edge that was forgotten determined by the measurement, if it is the only one of the path
+/// of unknown correlation, and is_better_anew().
+void determine_forgotten(const ObservePlan& plan, const ObservedPath& path, const Transform& Z_AB,
+                         std::vector<ObservedEdge>& edges);
 
 /// The parts of the owners: a ReviseRequest for each owner of an uncertain edge.
 /// @param absent  edges that are correlated with them, and keep their values

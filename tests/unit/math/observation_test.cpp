@@ -18,7 +18,6 @@ namespace {
 
 using testing::Consistency;
 using testing::ContainsSubstring;
-using testing::eigenvalues;
 using testing::Gaussian;
 using testing::ObservedChain;
 using testing::Random;
@@ -146,7 +145,7 @@ TEST_CASE("One edge seen by many others stays exact with few columns") {
   }
 }
 
-TEST_CASE("Columns that are dropped make the joint covariance larger and never smaller") {
+TEST_CASE("A long chain that is observed often stays exact, whatever columns that takes") {
   Random random(640);
   INFO("seed " << random.seed());
   ObservedChain chain(random, 40);
@@ -160,11 +159,8 @@ TEST_CASE("Columns that are dropped make the joint covariance larger and never s
       for (const CommonError& common_error : edge.X_PC.common_errors)
         CHECK(common_error.loading.cols() <= kMaxLoadingColumns);
     }
-    const Eigen::VectorXd values = eigenvalues(chain.dense() - P);
-    CHECK(values[0] > -1e-9 * P.cwiseAbs().maxCoeff());
   }
-  // There was no room.
-  CHECK((chain.dense() - P).cwiseAbs().maxCoeff() > 1e-6 * P.cwiseAbs().maxCoeff());
+  CHECK((chain.dense() - P).cwiseAbs().maxCoeff() < 1e-9 * P.cwiseAbs().maxCoeff());
 }
 
 // What a path has in common is that of its derivatives where it was observed. Each observation
