@@ -1,6 +1,7 @@
 #include "calls/observe_task.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <utility>
@@ -22,6 +23,18 @@ constexpr int kObserveAttempts = 8;
 // How often, and for how long, to wait for another observation to reach all owners.
 constexpr int kTornAttempts = 5;
 constexpr Milliseconds kTornPause{1};
+// One that has begun so long ago has reached all owners: an edge that lacks it was written since.
+constexpr Milliseconds kTornFor{50};
+
+// When an observation with that name has begun; absent: the name does not say it.
+std::optional<Time> begin_of(const std::string& source) {
+  std::int64_t ns = 0;
+  const char* const from = source.c_str() + std::min(source.size(), kObservedPrefix.size());
+  const char* const end = source.c_str() + source.size();
+  const auto read = std::from_chars(from, end, ns);
+  if (read.ec != std::errc() || read.ptr == end || *read.ptr != '.') return std::nullopt;
+  return time_of(ns);
+}
 
 // Whether a value differs by more than rounding, in units of its error.
 bool has_changed(const Belief& before, const Belief& after) {
@@ -43,11 +56,13 @@ bool has_changed(const Belief& before, const Belief& after) {
 }  // namespace
 
 ObserveTask::ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
-                         std::string source, bool asks_for_frames, const TimeLimit& limit)
+                         std::string source, std::vector<std::string> settled, bool asks_for_frames,
+                         const TimeLimit& limit)
     : forest_(forest),
       measurement_(std::move(measurement)),
       determined_(std::move(determined)),
       source_(std::move(source)),
+      settled_(std::move(settled)),
       asks_for_frames_(asks_for_frames),
       limit_(limit) {}
 
@@ -58,7 +73,8 @@ std::vector<std::string> ObserveTask::frames() const {
   return all;
 }
 
-Result<void> ObserveTask::plan(const Directory& directory, Clock::time_point) {
+Result<void> ObserveTask::plan(const Directory& directory, Clock::time_point now) {
+  if (!begun_) begun_ = now;
   stage_ = Stage::kNewest;
   const auto& [a, b, X_AB, stamp, options] = measurement_;
   std::vector<std::string> beside;
@@ -100,6 +116,15 @@ bool ObserveTask::leave_out_silent(const std::vector<Reply>& replies) {
     any = true;
   }
   return any;
+}
+
+// By the clocks of both observers. If they differ, it is waited for in vain, or not, and what it has
+// not corrected yet stays as it is (observe_beside_others()).
+bool ObserveTask::is_under_way(const std::string& source, Clock::time_point now) const {
+  if (std::count(settled_.begin(), settled_.end(), source) > 0) return false;
+  const auto own = begin_of(source_);
+  const auto other = begin_of(source);
+  return !own || !other || (*own - *other) + (now - *begun_) < kTornFor;
 }
 
 // The values of all edges of the plan, at one instant.
@@ -167,14 +192,17 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
   }
   // Other owners will soon have what one owner has applied already, unless an edge was written
   // since.
-  if (!path.lacking.empty() && torn_ < kTornAttempts && !limit_.over(now)) {
+  const auto& others = path.lacking_sources;
+  const bool torn = std::any_of(others.begin(), others.end(),
+                                [&](const std::string& one) { return is_under_way(one, now); });
+  if (torn && torn_ < kTornAttempts && !limit_.over(now)) {
     pause_ = kTornPause * (1 << torn_++);
     return Next::kPlan;
   }
   // What is left out may still be correlated with what is not, or will be in a moment.
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
-  const std::string source = source_ + "." + std::to_string(attempts_);
+  const std::string source = this->source();
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
   if (measurement_.options.independent) {

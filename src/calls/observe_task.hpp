@@ -25,10 +25,14 @@ struct Measurement {
 class ObserveTask final : public Task {
  public:
   /// @param determined  the frame whose edge takes all of it, whatever its value was; empty: none
-  /// @param source  a name of the measurement's error that no other has
+  /// @param source  a name of the measurement's error that no other has that begins with
+  ///   kObservedPrefix and when it has begun [ns], so that others know whether it is under way
+  /// @param settled  of the names of earlier ones, those that all owners have applied, as far as
+  ///   that is known
   /// @param asks_for_frames  the participant does not keep all frames
   ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
-              std::string source, bool asks_for_frames, const TimeLimit& limit);
+              std::string source, std::vector<std::string> settled, bool asks_for_frames,
+              const TimeLimit& limit);
 
   [[nodiscard]] std::vector<std::string> frames() const override;
   [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point now) override;
@@ -41,6 +45,8 @@ class ObserveTask final : public Task {
 
   /// Once it is done.
   [[nodiscard]] Observed& observed() { return observed_; }
+  /// The name of the measurement's error at the owners, once it is done.
+  [[nodiscard]] std::string source() const { return source_ + "." + std::to_string(attempts_); }
   /// Whether it could not wait for another observation, or correct all edges beside the path: the
   /// result is right, but less certain than both together allow (observe_beside_others()).
   [[nodiscard]] bool beside_others() const { return !absent_.empty() || !path_.lacking.empty(); }
@@ -55,6 +61,8 @@ class ObserveTask final : public Task {
     kTakeBack,
   };
 
+  /// Whether another observation may not have reached all owners yet.
+  [[nodiscard]] bool is_under_way(const std::string& source, Clock::time_point now) const;
   [[nodiscard]] Result<Next> values(std::vector<Reply> replies, Clock::time_point now);
   [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
   /// The edges of the path; that which the measurement determines is unspecified.
@@ -72,6 +80,7 @@ class ObserveTask final : public Task {
   const Measurement measurement_;
   const std::string determined_;
   const std::string source_;
+  const std::vector<std::string> settled_;
   const bool asks_for_frames_;
   const TimeLimit limit_;
   Stage stage_ = Stage::kNewest;
@@ -89,6 +98,7 @@ class ObserveTask final : public Task {
   Observed observed_;
   int attempts_ = 0;
   int torn_ = 0;
+  std::optional<Clock::time_point> begun_;  // when it was planned first
   Milliseconds pause_{0};
 };
 

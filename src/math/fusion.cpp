@@ -28,9 +28,10 @@ struct Gaussian {
 // The information of an estimate about δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ
 // has mean zero, and Jr(e) e = e.
 Gaussian seen_from(const Pose& X, const Transform& stated) {
-  const Transform estimate = with_unknown_rotation_of(X, stated);
-  const Twist e = log(estimate.pose.inverse() * X);
-  return {-e, right_jacobian(e) * root_of(estimate.covariance.of_specified().matrix())};
+  const Loading root = root_of(stated.covariance.of_specified().matrix());
+  const Measured estimate = with_unknown_rotation_of(X, {stated.pose, root});
+  const Twist e = log(estimate.X_AB.inverse() * X);
+  return {-e, right_jacobian(e) * estimate.root};
 }
 
 // Product of two Gaussians by the gain, which needs no inverse of either. False if they contradict
@@ -82,7 +83,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
   // What knows nothing of a rotation would cost the others their digits.
   std::size_t first = 0;
   for (std::size_t k = estimates.size(); k-- > 0;) {
-    if (unknown_rotations(estimates[k].covariance.of_specified()) == 0) first = k;
+    if (unknown_rotations(root_of(estimates[k].covariance.of_specified().matrix())) == 0) first = k;
   }
   Pose X = estimates[first].pose;
   for (int iteration = 1; iteration <= kMostFusions; ++iteration) {

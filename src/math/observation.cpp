@@ -44,8 +44,8 @@ class Update {
         source_(source),
         options_(options),
         prior_(edges),
-        R_(Z_AB.covariance.of_specified()),
-        unknown_rotations_(tfdude::unknown_rotations(R_)),
+        root_(root_of(Z_AB.covariance.of_specified().matrix())),
+        unknown_rotations_(tfdude::unknown_rotations(root_)),
         independent_(options.independent),
         merge_(merge) {}
 
@@ -92,18 +92,18 @@ class Update {
   }
 
   [[nodiscard]] PathMinimum first_minimum() const {
-    return independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R_));
+    return independent_ ? minimum({1.0, 1.0}) : minimum(bound_weights(path(), R()));
   }
   void turn_to(const Pose& X_AB) {
-    const Transform turned = with_unknown_rotation_of(X_AB, {Z_AB_, R_});
-    Z_AB_ = turned.pose;
-    R_ = turned.covariance.of_specified();
+    Measured turned = with_unknown_rotation_of(X_AB, {Z_AB_, root_});
+    Z_AB_ = turned.X_AB;
+    root_ = std::move(turned.root);
   }
   // Whether the path has turned about them since.
   [[nodiscard]] bool turns(const PathMinimum& found) const {
     constexpr double kEnough = 1e-3;  // [rad]
     if (unknown_rotations_ == 0 || !found.converged) return false;
-    const Pose& turned = with_unknown_rotation_of(found.linear.X_AB, {Z_AB_, R_}).pose;
+    const Pose turned = with_unknown_rotation_of(found.linear.X_AB, {Z_AB_, root_}).X_AB;
     return turned.rotation().angularDistance(Z_AB_.rotation()) > kEnough;
   }
 
@@ -119,7 +119,7 @@ class Update {
     } else if (prior_.has_path()) {
       const auto H = at_start().H;
       for (const std::size_t k : unknown) {
-        R_ = bound(R_, seen(H[k], all_[k].X_PC.unknown->matrix()));
+        root_ = root_of(bound(R(), seen(H[k], all_[k].X_PC.unknown->matrix())).matrix());
       }
     } else if (unknown.empty()) {
       return fail(Errc::kInvalidInput,
@@ -144,6 +144,11 @@ class Update {
     return Covariance::trusted(Matrix6d(root * root.transpose()));
   }
 
+  // The covariance of the measurement.
+  [[nodiscard]] Covariance R() const {
+    return Covariance::trusted(Matrix6d(root_ * root_.transpose()));
+  }
+
   // With P and R by these factors.
   [[nodiscard]] PathMinimum minimum(const BoundWeights& weights) const {
     if (weights.of_A == 1.0) return minimize(all_, prior_, Z_AB_, noise(weights));
@@ -152,7 +157,7 @@ class Update {
     return minimize(all_, prior, Z_AB_, noise(weights));
   }
   [[nodiscard]] Loading noise(const BoundWeights& weights) const {
-    return std::sqrt(weights.of_B) * root_of(R_.matrix());
+    return std::sqrt(weights.of_B) * root_;
   }
 
   // By the cost at the minimum. That at the estimate is larger if the path is curved.
@@ -235,7 +240,7 @@ class Update {
   const std::string& source_;
   const ObserveOptions& options_;
   JointPrior prior_;
-  Covariance R_;
+  Loading root_;                 // of the covariance of the measurement
   const int unknown_rotations_;  // axes
   bool independent_;
   const bool merge_;  // the sources of earlier observations

@@ -11,9 +11,9 @@ namespace {
 
 // π²/3 [rad²], of an angle that is anywhere.
 constexpr double kAnywhere = 3.289868133696453;
-// Instead of what was stated [rad²]: the rotation is that of the path, and must not confirm it, how
+// Instead of what was stated [rad]: the rotation is that of the path, and must not confirm it, how
 // often it may be measured.
-constexpr double kNothing = 1e6;
+constexpr double kNothing = 1e3;
 
 struct RotationAxes {
   Eigen::Matrix3d axes;  // columns, those that are known first
@@ -47,15 +47,13 @@ Eigen::Quaterniond about(const Eigen::Vector3d& axis, const Eigen::Quaterniond& 
   return turn.normalized();
 }
 
-Transform turned_by(const Transform& Z_AB, const Eigen::Quaterniond& T, const Matrix6d& R) {
-  return {Pose::trusted((Z_AB.pose.rotation() * T).normalized(), Z_AB.pose.translation()),
-          Covariance::trusted(0.5 * (R + R.transpose()))};
+Pose turned_by(const Pose& Z_AB, const Eigen::Quaterniond& T) {
+  return Pose::trusted((Z_AB.rotation() * T).normalized(), Z_AB.translation());
 }
 
 // Only the turn about one axis is known. How it depends on the rotation of the path, whose axes are
 // others, is what the measurement says of that.
-Transform with_one_turn(const Transform& Z_AB, const Loading& root, const RotationAxes& of,
-                        const Eigen::Quaterniond& E) {
+Measured with_one_turn(const Measured& Z_AB, const RotationAxes& of, const Eigen::Quaterniond& E) {
   const Eigen::Vector3d w = of.axes.col(0);
   const double a = E.vec().dot(w);
   const double c = E.w();
@@ -69,38 +67,35 @@ Transform with_one_turn(const Transform& Z_AB, const Loading& root, const Rotati
   const Eigen::Vector3d by = g / g.squaredNorm();
   const Eigen::Quaterniond back(Eigen::AngleAxisd(-turn * by.norm(), by.normalized()));
   const Eigen::Quaterniond T = E * back;
-  const Eigen::Matrix3d turned = T.toRotationMatrix();
-  const Eigen::Matrix3d across =
-      Eigen::Matrix3d::Identity() - by * by.transpose() / by.squaredNorm();
-  Loading known(6, root.cols());
-  known << turned.transpose() * root.topRows<3>(), by * (w.transpose() * root.bottomRows<3>());
-  Matrix6d all = known * known.transpose();
-  all.bottomRightCorner<3, 3>() += kNothing * across;
-  return turned_by(Z_AB, T, all);
+  Loading known(6, Z_AB.root.cols());
+  known << T.toRotationMatrix().transpose() * Z_AB.root.topRows<3>(),
+      by * (w.transpose() * Z_AB.root.bottomRows<3>());
+  Loading across = Loading::Zero(6, 3);
+  across.bottomRows<3>() =
+      kNothing * (Eigen::Matrix3d::Identity() - by * by.transpose() / by.squaredNorm());
+  return {turned_by(Z_AB.X_AB, T), joined(known, across)};
 }
 
 }  // namespace
 
-int unknown_rotations(const Covariance& R) { return 3 - axes_of(root_of(R.matrix())).known; }
+int unknown_rotations(const Loading& root) { return 3 - axes_of(root).known; }
 
-Transform with_unknown_rotation_of(const Pose& X_AB, const Transform& Z_AB) {
-  const Loading root = root_of(Z_AB.covariance.of_specified().matrix());
-  const RotationAxes of = axes_of(root);
+Measured with_unknown_rotation_of(const Pose& X_AB, const Measured& Z_AB) {
+  const RotationAxes of = axes_of(Z_AB.root);
   if (of.known == 3) return Z_AB;
-  const Eigen::Quaterniond E = Z_AB.pose.rotation().conjugate() * X_AB.rotation();
-  if (of.known == 1) return with_one_turn(Z_AB, root, of, E);
+  const Eigen::Quaterniond E = Z_AB.X_AB.rotation().conjugate() * X_AB.rotation();
+  if (of.known == 1) return with_one_turn(Z_AB, of, E);
   const Eigen::Quaterniond T = of.known == 0 ? E : about(of.axes.col(2), E);
   const Eigen::Matrix3d turned = T.toRotationMatrix();
+  // Along the axes that are known nothing changes; along the others nothing is left.
+  const Eigen::MatrixXd unknown = of.axes.rightCols(3 - of.known);
+  Loading root(6, Z_AB.root.cols() + unknown.cols());
+  root << Z_AB.root, Loading::Zero(6, unknown.cols());
+  root.bottomRows<3>() -= unknown * (unknown.transpose() * root.bottomRows<3>()).eval();
+  root.bottomRightCorner(3, unknown.cols()) = kNothing * unknown;
   Matrix6d turn = Matrix6d::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = turned.transpose();
-  // Along the axes that are known nothing changes; along the others nothing is left.
-  Matrix6d known = Matrix6d::Identity();
-  const Eigen::MatrixXd unknown = of.axes.rightCols(3 - of.known);
-  known.bottomRightCorner<3, 3>() -= unknown * unknown.transpose();
-  const Loading left = known * root;
-  Matrix6d R = left * left.transpose();
-  R.bottomRightCorner<3, 3>() += kNothing * unknown * unknown.transpose();
-  return turned_by(Z_AB, T, turn * R * turn.transpose());
+  return {turned_by(Z_AB.X_AB, T), turn * root};
 }
 
 }  // namespace tfdude

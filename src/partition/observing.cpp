@@ -62,8 +62,10 @@ Result<void> place(const Directory& directory, Edge edge, std::optional<Time> st
 
 // Adds the edges that this one was observed with, but that do not depend on the source of that. One
 // that is listed twice has been waited for before.
-void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t edge,
-                 std::vector<std::string>& lacking) {
+void add_lacking(const ObservePlan& plan, std::size_t edge, ObservedPath& path) {
+  const auto add_once = [](const std::string& one, std::vector<std::string>& all) {
+    if (std::count(all.begin(), all.end(), one) == 0) all.push_back(one);
+  };
   const auto& own = path.edges[edge].X_PC.common_errors;
   const auto& with = path.correlations[edge].observed_with;
   const auto source = std::find_if(own.begin(), own.end(), [](const CommonError& one) {
@@ -80,7 +82,8 @@ void add_lacking(const ObservePlan& plan, const ObservedPath& path, std::size_t 
     const std::string& id = plan.edges[k].info.id;
     if (std::count(with.begin(), with.end(), id) != 1) continue;
     if (is_moving(id, path.correlations[k])) continue;
-    if (std::count(lacking.begin(), lacking.end(), id) == 0) lacking.push_back(id);
+    add_once(id, path.lacking);
+    add_once(source->source, path.lacking_sources);
   }
 }
 
@@ -298,7 +301,7 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
     add_rows(answers[plan.edges[k].part].rows, plan.edges[k], k, path);
   }
-  for (std::size_t k = 0; k < plan.edges.size(); ++k) add_lacking(plan, path, k, path.lacking);
+  for (std::size_t k = 0; k < plan.edges.size(); ++k) add_lacking(plan, k, path);
   return path;
 }
 

@@ -52,6 +52,7 @@ struct ObservedPath {
   /// Edges that lack the source of their joint observation with another one: another observation
   /// may be in progress.
   std::vector<std::string> lacking;
+  std::vector<std::string> lacking_sources;  ///< of these observations, each once
 };
 
 /// @param beside  edges observed together with some of the path; those that are missing or cannot

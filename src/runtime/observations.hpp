@@ -2,10 +2,12 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/mutex.hpp"
 #include "calls/observe_task.hpp"
 #include "runtime/context.hpp"
 #include "runtime/requests.hpp"
@@ -29,10 +31,18 @@ class Observations {
   [[nodiscard]] Result<std::vector<EdgeConsistency>> consistency(const std::string& partition);
 
  private:
+  // Older ones are recognized by their age.
+  static constexpr std::size_t kMostSettled = 16;
+
+  [[nodiscard]] std::vector<std::string> settled() const;
+  void settle(std::string source);
+
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
   std::atomic<std::uint64_t> count_{0};
+  mutable Mutex mutex_;
+  std::deque<std::string> settled_ TFDUDE_GUARDED_BY(mutex_);  // sources of the last ones, all done
 };
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calls/observe_task.hpp"
 #include "math/observe_beside.hpp"
 #include "partition/partition.hpp"
 #include "support/catch.hpp"
@@ -14,6 +15,7 @@
 namespace tfdude {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::ContainsSubstring;
 using testing::presence_of;
 using testing::Random;
@@ -124,6 +126,8 @@ TEST_CASE("answers are assembled in the order of the edges and missing edges are
   const CommonError common_error{"observed:other", true, Loading::Ones(6, 1)};
   answers[0].correlations[0].common_errors = {common_error};
   CHECK(observed_path(*plan, answers)->lacking == std::vector<std::string>{"hand"});
+  CHECK(observed_path(*plan, answers)->lacking_sources ==
+        std::vector<std::string>{"observed:other"});
   // One that has been waited for before.
   answers[0].correlations[0].observed_with = {"tool", "leg", "hand", "hand"};
   CHECK(observed_path(*plan, answers)->lacking.empty());
@@ -134,6 +138,37 @@ TEST_CASE("answers are assembled in the order of the edges and missing edges are
   const auto short_of_one = observed_path(*plan, answers);
   REQUIRE_FALSE(short_of_one);
   CHECK(short_of_one.error().code == Errc::kNotOwner);
+}
+
+// An edge that was written since it was observed lacks the source for good.
+TEST_CASE("an observation waits only for others that may not have reached all owners yet") {
+  Random random(0x0b58);
+  const Known known(random);
+  const TimeLimit::Clock::time_point start{std::chrono::hours(1)};
+  // Another observation began at 1.000 s, as its name says; this one later by so much.
+  const auto pause_after = [&](std::chrono::milliseconds later, const std::string& other,
+                               const std::vector<std::string>& settled) {
+    const std::string own = "observed:" + std::to_string(nanoseconds(Time(1s) + later)) + ".7.1";
+    ObserveTask task(known.forest, {"tool", "world", random.transform(), {}, {}}, "", own, settled,
+                     false, TimeLimit(1s, start));
+    REQUIRE(task.plan(known.directory, start));
+    const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
+    auto answers = answers_to(*plan, random);
+    answers[0].correlations[0] = {{}, {{other, true, Loading::Ones(6, 1)}}, {"tool", "hand"}};
+    std::vector<Reply> replies(answers.size());
+    for (std::size_t i = 0; i < answers.size(); ++i) replies[i].body = std::move(answers[i]);
+    const auto next = task.take(std::move(replies), start);
+    REQUIRE(next);
+    const bool waits = task.pause() > Milliseconds(0);
+    CHECK((*next == Task::Next::kPlan) == waits);
+    return waits;
+  };
+  const std::string other = "observed:1000000000.3.5.0";
+  CHECK(pause_after(10ms, other, {}));
+  CHECK(pause_after(-10s, other, {}));  // the clocks differ
+  CHECK(pause_after(10ms, "observed:other", {}));
+  CHECK_FALSE(pause_after(60ms, other, {}));
+  CHECK_FALSE(pause_after(10ms, other, {"observed:x", other}));
 }
 
 TEST_CASE("an observation beside one in progress stays tied to the edges that lack it") {
