@@ -228,7 +228,9 @@ TEST_CASE("handover: as many samples as may go at once, and no more") {
   odom.timing = long_history();
   Node first = Node::open(join("first"), "first", {{"map", "", {}}, odom}).value();
   Node second = Node::open(join("second"), "second", {}).value();
-  Client client = Client::open(join("")).value();
+  Options patient;  // on a busy computer
+  patient.timeout = std::chrono::seconds(10);
+  Client client = Client::open(join(""), patient).value();
   REQUIRE(client.exists("odom"));
   for (std::int64_t t = 0; t < 65'536; ++t)
     REQUIRE(first.update("odom", along_x(static_cast<double>(t)), ms(t)));

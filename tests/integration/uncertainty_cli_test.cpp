@@ -99,7 +99,12 @@ TEST_CASE("uncertainty: a measurement corrects or is rejected by the gate and is
       robot.answered(with({"observe", "world", "arm", "--xyz", "9", "1", "0"}, kSure), 1);
   CHECK_FALSE(refused.at("accepted").get<bool>());
   CHECK(refused.at("distance_squared").get<double>() > refused.at("limit").get<double>());
-  CHECK(robot.answered({"lookup", "world", "arm"}).at("translation") == after.at("translation"));
+  // On a busy computer another way to the answer rounds in another way.
+  const json kept = robot.answered({"lookup", "world", "arm"});
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    CHECK(kept.at("translation").at(i).get<double>() ==
+          testing::Approx(after.at("translation").at(i).get<double>()).margin(1e-12));
+  }
   const CliResult text =
       robot.run(with({"observe", "world", "arm", "--xyz", "9", "1", "0"}, kSure));
   CHECK(text.status == 1);
