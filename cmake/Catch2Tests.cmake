@@ -1,5 +1,6 @@
 # Contains all differences in the build between Catch2 2.13 (Debian 12) and 3.7 (Debian 13). Defines tfdude_add_tests().
 find_package(Catch2 REQUIRED)
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
 include(Catch)
 
 # Compiles the headers that all tests share, once without and once with optimization, because the compiler takes
@@ -33,6 +34,37 @@ endfunction()
 # The output of Catch2 2 and 3 if a filter matches no test case; Catch2 2 still exits with success.
 set(TFDUDE_NOTHING_RAN "No test cases matched|No tests ran")
 
+# tfdude_join_tests(target files): names of sources. With TFDUDE_UNITY (cmake/Unity.cmake), tests are compiled eight at
+# once, by files in the build tree that take their place.
+function(tfdude_join_tests target files)
+  if(NOT TFDUDE_UNITY)
+    return()
+  endif()
+  set(others ${${files}})
+  list(FILTER others EXCLUDE REGEX "_test\\.cpp$")
+  set(tests ${${files}})
+  list(FILTER tests INCLUDE REGEX "_test\\.cpp$")
+  list(TRANSFORM tests PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  while(tests)
+    list(SUBLIST tests 0 8 together)
+    list(REMOVE_ITEM tests ${together})
+    list(LENGTH tests left)
+    list(LENGTH together count)
+    set(joined ${CMAKE_CURRENT_BINARY_DIR}/joined/${target}_${left}.cpp)
+    if(count EQUAL 1)
+      set(joined ${together})
+    else()
+      add_custom_command(OUTPUT ${joined}
+        COMMAND Python3::Interpreter ${CMAKE_SOURCE_DIR}/tests/join_files.py ${joined} ${together}
+        DEPENDS ${CMAKE_SOURCE_DIR}/tests/join_files.py ${together} COMMENT "Joining tests of ${target}" VERBATIM)
+      target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})  # where they are themselves
+      target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    endif()
+    list(APPEND others ${joined})
+  endwhile()
+  set(${files} ${others} PARENT_SCOPE)
+endfunction()
+
 # tfdude_add_tests(target [OPTIMIZED] LABELS label... [TIMEOUT seconds] [SKIPPED_BY regex] SOURCES file...
 # [LIBRARIES target...]): adds a Catch2 binary. Each of its test cases becomes a ctest test, which counts as skipped if
 # its output matches the regular expression. OPTIMIZED is for tests that compute for seconds.
@@ -44,7 +76,9 @@ function(tfdude_add_tests target)
   if(CMAKE_CROSSCOMPILING)
     math(EXPR ARG_TIMEOUT "20 * ${ARG_TIMEOUT}")  # an emulator runs them
   endif()
-  add_executable(${target} ${ARG_SOURCES})
+  add_executable(${target})
+  tfdude_join_tests(${target} ARG_SOURCES)
+  target_sources(${target} PRIVATE ${ARG_SOURCES})
   target_include_directories(${target} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   target_link_libraries(${target} PRIVATE result_errors test_support tfdude_open Catch2::Catch2WithMain tfdude_options
     ${ARG_LIBRARIES})

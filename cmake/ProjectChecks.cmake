@@ -1,6 +1,5 @@
 # Tests of the project itself rather than of its code: the layers, the words, the IDL, the installed package and the
 # README.
-find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
 # tfdude_add_check(name script [argument...]): a test of the sources, pages or scripts, which needs no build.
 function(tfdude_add_check name script)
@@ -11,6 +10,7 @@ tfdude_add_check("layers: sources" tests/check_layers.py)
 tfdude_add_check("layers: the check itself" tests/check_layers.py --self-test)
 tfdude_add_check("unity: names that files of a folder share" tests/check_unity.py)
 tfdude_add_check("unity: the check itself" tests/check_unity.py --self-test)
+tfdude_add_check("joining: the check itself" tests/join_files.py --self-test)
 tfdude_add_check("version: all files say the same" tests/check_version.py)
 tfdude_add_check("version: the check itself" tests/check_version.py --self-test)
 tfdude_add_check("links: pages and headings that others name" tests/check_links.py)

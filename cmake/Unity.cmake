@@ -2,7 +2,7 @@
 # headers and templates that they share. A whole build takes much less time then, and a changed file more; so
 # scripts/build --programs does it for a first build, and so does continuous integration. All other builds, that of
 # Debian 13 and the preset dev among them, compile each file alone. Names in unnamed namespaces are unique in a folder,
-# which tests/check_unity.py checks.
+# which tests/check_unity.py checks. Tests may share such names; tests/join_files.py keeps them apart.
 option(TFDUDE_UNITY "Compile the files of a folder together" OFF)
 
 function(tfdude_compile_together target)

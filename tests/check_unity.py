@@ -11,7 +11,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-FOLDERS = ["src/**/", "apps/**/", "python/src/"]
+FOLDERS = ["src/**/", "apps/**/", "python/src/", "tests/faults/", "tests/simulation/"]
 HIDDEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)
 TYPE = re.compile(r"(?:template <[^{]*?> )?(?:struct|class|enum(?: class)?|union) (?:\[\[\w+\]\] )?(\w+)")
 FUNCTION = re.compile(r"[^(=]*?(\w+)\s*\((.*)\)[^()]*$")

@@ -15,6 +15,10 @@ namespace tfdude::faults {
 
 using Clock = std::chrono::steady_clock;
 
+inline double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
 /// How long after the last fault all participants must be up to date [s].
 inline constexpr double kGrace = 5.0;
 

@@ -5,10 +5,6 @@
 namespace tfdude::faults {
 namespace {
 
-double milliseconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
 // The precision of an answer's time.
 constexpr std::chrono::milliseconds kAskEvery{5};
 

@@ -43,10 +43,6 @@ std::set<std::string> shared_memory_of(pid_t process) {
   return names;
 }
 
-double milliseconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
-}
-
 // The database, and the files that SQLite keeps next to it while it is open.
 bool one_database(const std::set<std::string>& names) {
   std::set<std::string> databases;

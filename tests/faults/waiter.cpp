@@ -13,7 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr Milliseconds kWait{600000};
-constexpr milliseconds kLookEvery{20};
+constexpr milliseconds kAttendEvery{20};
 constexpr milliseconds kSendEvery{10};
 // A streamed value arrives within this time, also on a busy machine.
 constexpr milliseconds kArrivesWithin{1500};
@@ -56,7 +56,7 @@ void Waiter::wait() {
   std::vector<Waiting> waiting(frames_.size());
   while (!stopping_) {
     for (std::size_t i = 0; i < frames_.size(); ++i) attend(i, waiting[i]);
-    std::this_thread::sleep_for(kLookEvery);
+    std::this_thread::sleep_for(kAttendEvery);
   }
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 // A client owns about this many frames at most.
 constexpr std::size_t kFrames = 40;
-constexpr std::size_t kJoints = 3;
+constexpr std::size_t kJointsOfWorker = 3;
 constexpr std::size_t kRemovedKept = 10;
 
 std::string translation(const Transform& X) {
@@ -50,7 +50,7 @@ void Worker::stop() {
 }
 
 void Worker::add_joints() {
-  for (std::size_t i = 0; i < kJoints; ++i) {
+  for (std::size_t i = 0; i < kJointsOfWorker; ++i) {
     const std::string id = prefix_ + "joint_" + std::to_string(i);
     const std::string base = any_base();
     Result<void> added;

@@ -15,8 +15,8 @@
 namespace tfdude::simulation {
 namespace {
 
-constexpr Instant kLook = milliseconds(100);
-constexpr Instant kPatience = milliseconds(30'000);
+constexpr Instant kObserveEvery = milliseconds(100);
+constexpr Instant kLongestWait = milliseconds(30'000);
 // Longer than owners wait to tell how many others they hear.
 constexpr Instant kSettle = milliseconds(1'000);
 // Longer than participants ask somebody for signs of life whom they have sent something.
@@ -183,10 +183,10 @@ class Calm {
     };
     const Instant begin = timeline_.now();
     for (auto one = missing(); one != processes_.end() && !failure_; one = missing()) {
-      if (timeline_.now() > begin + kPatience) {
+      if (timeline_.now() > begin + kLongestWait) {
         fail_with({Errc::kState, (*one)->partition() + " does not serve or know all frames"});
       }
-      advance(kLook);
+      advance(kObserveEvery);
     }
     return seconds(timeline_.now());
   }

@@ -11,7 +11,7 @@ namespace {
 using faults::base_edge;
 using faults::base_of;
 
-constexpr Instant kLook = milliseconds(20);
+constexpr Instant kLookAfter = milliseconds(20);
 
 }  // namespace
 
@@ -86,7 +86,7 @@ void Daemons::look_after() {
     cast_.daemons[i].reset();
     start(i, disk_of(i));
   }
-  world_.timeline.after(kLook, {"look"}, [this] { look_after(); });
+  world_.timeline.after(kLookAfter, {"look"}, [this] { look_after(); });
 }
 
 void Daemons::begin(const Fault& fault) {

@@ -15,7 +15,7 @@
 namespace {
 
 // The states that must occur at least once in so many runs.
-constexpr std::uint64_t kMany = 1000;
+constexpr std::uint64_t kManySeeds = 1000;
 constexpr const char* kRare[] = {"a process gave its partition up",
                                  "a process overtook its predecessor",
                                  "an older process was ignored",
@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
   }
   // A state that never occurs is not tested.
   for (const char* rare : kRare) {
-    if (count < kMany || total.counts[rare] > 0) continue;
+    if (count < kManySeeds || total.counts[rare] > 0) continue;
     ++total.failed;
     std::printf("  it never happened that %s\n", rare);
   }

@@ -8,7 +8,7 @@
 namespace tfdude::simulation {
 namespace {
 
-using Time = TimeLimit::Clock::time_point;
+using SteadyTime = TimeLimit::Clock::time_point;
 
 // How soon it is planned again while not all is known.
 constexpr Instant kPoll = milliseconds(10);
@@ -26,7 +26,7 @@ std::shared_ptr<Task> RunningCall::change(Route route) {
   return std::make_shared<ChangeTask<decltype(planned)>>(planned);
 }
 
-Time RunningCall::now() const { return caller_.world().timeline.steady(); }
+SteadyTime RunningCall::now() const { return caller_.world().timeline.steady(); }
 
 // A step may itself be an input of the process, which then comes here again.
 void RunningCall::go_on() {
@@ -74,7 +74,7 @@ void RunningCall::plan() {
 
 bool RunningCall::ask() {
   if (!call_.requests().complete()) {
-    const Time next = call_.requests().step(now(), caller_);
+    const SteadyTime next = call_.requests().step(now(), caller_);
     if (!call_.requests().complete() && wait_until(next)) return false;
   }
   if (call_.requests().complete()) call_.replied(now());
@@ -98,7 +98,7 @@ bool RunningCall::store() {
 }
 
 /// @return whether that is later
-bool RunningCall::wait_until(Time until) {
+bool RunningCall::wait_until(SteadyTime until) {
   if (until <= now()) return false;
   if (std::exchange(wakes_, until) == until) return true;
   caller_.later("call", until - now(), [weak = weak_from_this(), until] {

@@ -22,7 +22,7 @@ const EdgeTiming& timing() {
 }
 
 // The number of the sample whose value this is, or a number between those of two.
-double number_of(const Transform& X) { return X.pose.translation().y(); }
+double shown_number(const Transform& X) { return X.pose.translation().y(); }
 
 bool same(double a, double b) { return std::abs(a - b) < kTolerance; }
 
@@ -136,9 +136,9 @@ Samples::Broken Samples::answered(std::optional<Time> at, std::uint64_t by,
 // Only the configured value holds for all times: a process that was started again has the last
 // sample with its stamp.
 Samples::Broken Samples::judge_static(const StampedTransform& X, std::uint64_t by) const {
-  if (era_of(by)) return {"a history is lost", text(number_of(X)) + " holds for all times"};
-  if (same(number_of(X), 0)) return {};
-  return {"a value that nobody wrote", text(number_of(X)) + " holds for all times"};
+  if (era_of(by)) return {"a history is lost", text(shown_number(X)) + " holds for all times"};
+  if (same(shown_number(X), 0)) return {};
+  return {"a value that nobody wrote", text(shown_number(X)) + " holds for all times"};
 }
 
 Samples::Broken Samples::judge_newest(const StampedTransform& X, std::uint64_t by) {
@@ -147,12 +147,12 @@ Samples::Broken Samples::judge_newest(const StampedTransform& X, std::uint64_t b
       std::find_if(history.rbegin(), history.rend(), [](const Kept& one) { return one.certain; });
   if (newest != history.rend() && *X.stamp < newest->stamp) {
     return {"a newer sample is known",
-            text(number_of(X)) + " after sample " + std::to_string(newest->number)};
+            text(shown_number(X)) + " after sample " + std::to_string(newest->number)};
   }
   const auto shown = std::find_if(history.begin(), history.end(),
                                   [&](const Kept& one) { return one.stamp == *X.stamp; });
-  if (shown == history.end() || !same(number_of(X), static_cast<double>(shown->number))) {
-    return {"a value that nobody wrote", text(number_of(X)) + " at " + to_string(*X.stamp)};
+  if (shown == history.end() || !same(shown_number(X), static_cast<double>(shown->number))) {
+    return {"a value that nobody wrote", text(shown_number(X)) + " at " + to_string(*X.stamp)};
   }
   // The last one of an earlier process may have been restored: the next one begins a history.
   if (!era_of(by)) return {};
@@ -168,7 +168,7 @@ Samples::Broken Samples::judge_at(Time at, const StampedTransform& X, std::uint6
                                             [](const Kept& one, Time t) { return one.stamp < t; });
   for (auto after = first_after; after != history.end(); ++after) {
     if (after->stamp == at) {
-      if (same(number_of(X), static_cast<double>(after->number))) return {};
+      if (same(shown_number(X), static_cast<double>(after->number))) return {};
       if (after->certain) break;
       continue;
     }
@@ -178,14 +178,14 @@ Samples::Broken Samples::judge_at(Time at, const StampedTransform& X, std::uint6
                            std::chrono::duration<double>(after->stamp - before->stamp);
       const double a = static_cast<double>(before->number);
       const double value = a + share * (static_cast<double>(after->number) - a);
-      if (same(number_of(X), value)) return {};
+      if (same(shown_number(X), value)) return {};
       expected += " " + std::to_string(value);
       if (before->certain) break;
     }
     if (after->certain) break;
   }
   return {"a value between others",
-          text(number_of(X)) + " at " + to_string(at) + ", not one of" + expected};
+          text(shown_number(X)) + " at " + to_string(at) + ", not one of" + expected};
 }
 
 Samples::Broken Samples::judge_error(std::optional<Time> at, std::uint64_t by,

@@ -13,7 +13,7 @@ using faults::base_of;
 
 // A call asks a few times, and the replies to it are kept until the next one.
 constexpr std::size_t kRepliesPerClient = 8;
-constexpr milliseconds kPoll{50};
+constexpr milliseconds kStep{50};
 
 std::string difference(const std::vector<std::string>& a, const std::vector<std::string>& b) {
   std::string text;
@@ -312,8 +312,8 @@ void Verdict::check_samplers() {
 
 void Verdict::await_calls() {
   const auto open = [](const auto& actor) { return actor->process().open_calls() > 0; };
-  for (Instant waited{0}; waited < 2 * RunningCall::kTimeout; waited += kPoll) {
-    calls_.wait(kPoll);
+  for (Instant waited{0}; waited < 2 * RunningCall::kTimeout; waited += kStep) {
+    calls_.wait(kStep);
     if (std::none_of(cast_.authors.begin(), cast_.authors.end(), open) &&
         std::none_of(cast_.samplers.begin(), cast_.samplers.end(), open)) {
       return;

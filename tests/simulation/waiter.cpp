@@ -14,7 +14,7 @@ using faults::base_edge;
 using faults::base_of;
 
 // How much later than its time a lookup may end.
-constexpr Instant kEndsWithin = milliseconds(20);
+constexpr Instant kWaitEndsWithin = milliseconds(20);
 // How long after the faults each frame that is known can be looked up.
 constexpr Instant kCalmAfter = milliseconds(5000);
 
@@ -123,7 +123,7 @@ void Waiter::wait(Error last) {
   world.invariants.called(
       process_, [weak = std::weak_ptr(lookup_)] { return weak.expired(); },
       "lookup of " + frame_ + ", which waits",
-      world.timeline.now() + (limit_->at() - now()) + kEndsWithin);
+      world.timeline.now() + (limit_->at() - now()) + kWaitEndsWithin);
   attend(false);
 }
 
