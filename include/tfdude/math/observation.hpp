@@ -49,7 +49,8 @@ struct ObservedResult {
   Belief X_PC;
   bool corrected = false;  ///< false: unchanged
   /// More than kMaxObservedTogether edges are correlated. This one is among the least correlated
-  /// with the path: its error now counts as independent of the others.
+  /// with the path. Its error now counts as independent of the others, or, if it had more than a
+  /// tenth in common with one of them along an axis, as of unknown correlation.
   bool forgotten = false;
   NormalizedInnovation innovation;
 };
@@ -75,8 +76,8 @@ struct Observation {
 /// second observation does not treat the edges' errors as independent. Common errors of other
 /// sources are kept as in a Schmidt-Kalman filter: what other edges hold of such a source need not
 /// change. A single uncertain edge takes all of the correction, and needs no new source. The
-/// columns are as few as the correlation allows; beyond 144 they are dropped in such a way that no
-/// covariance becomes too small. At most kMaxObservedTogether edges stay correlated.
+/// columns are few if others depend on a few edges only, and otherwise little more than the edges
+/// have dimensions. At most kMaxObservedTogether edges stay correlated.
 ///
 /// Parts of unknown correlation count as part of the measurement's error, which is then not
 /// independent of the rest. If such an edge is the only uncertain one, it is corrected by
