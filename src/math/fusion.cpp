@@ -1,6 +1,7 @@
 #include "tfdude/math/fusion.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -45,20 +46,32 @@ bool merge(Gaussian& sum, const Gaussian& more, double reach) {
   return true;
 }
 
-// Whether the last step was below rounding, or a billionth of the deviations.
-bool is_small(const Gaussian& step, double reach) {
-  constexpr double kEnough = 1e-9;
-  Twist hidden;
-  hidden << Eigen::Vector3d::Constant(kFusionConverged * reach),
-      Eigen::Vector3d::Constant(kFusionConverged);
-  const Twist enough = hidden.cwiseMax(kEnough * step.root.rowwise().norm());
-  return (step.mean.cwiseAbs().array() <= enough.array()).all();
-}
-
 double reach_of(const std::vector<Transform>& estimates) {
   double reach = 0;
   for (const Transform& one : estimates) reach = std::max(reach, one.pose.translation().norm());
   return reach;
+}
+
+// What rounding hides of a step. A deviation of kilometres costs the other axes of an estimate that
+// is turned their last digits.
+Twist rounding_of(const std::vector<Transform>& estimates, double reach) {
+  constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
+  double widest = 0;
+  for (const Transform& one : estimates) {
+    const Twist variances = one.covariance.of_specified().matrix().diagonal();
+    widest = std::max(widest, std::sqrt(variances.head<3>().maxCoeff()));
+  }
+  Twist hidden;
+  hidden << Eigen::Vector3d::Constant(kFusionConverged * reach + kDigits * widest),
+      Eigen::Vector3d::Constant(kFusionConverged);
+  return hidden;
+}
+
+// Whether the last step was below rounding, or a billionth of the deviations.
+bool is_small(const Gaussian& step, const Twist& hidden) {
+  constexpr double kEnough = 1e-9;
+  const Twist enough = hidden.cwiseMax(kEnough * step.root.rowwise().norm());
+  return (step.mean.cwiseAbs().array() <= enough.array()).all();
 }
 
 Transform weighted(const Transform& X, double weight) {
@@ -80,6 +93,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
   if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
   if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
   const double reach = reach_of(estimates);
+  const Twist hidden = rounding_of(estimates, reach);
   // What knows nothing of a rotation would cost the others their digits.
   std::size_t first = 0;
   for (std::size_t k = estimates.size(); k-- > 0;) {
@@ -97,7 +111,7 @@ Result<Fused> fuse(const std::vector<Transform>& estimates) {
       }
     }
     X = X * exp(sum.mean);
-    if (is_small(sum, reach)) {
+    if (is_small(sum, hidden)) {
       return Fused{{X, Covariance::trusted(Matrix6d(sum.root * sum.root.transpose()))}, iteration};
     }
   }
