@@ -118,8 +118,8 @@ bool ObserveTask::leave_out_silent(const std::vector<Reply>& replies) {
   return any;
 }
 
-// By the clocks of both observers. If they differ, it is waited for in vain, or not, and what it has
-// not corrected yet stays as it is (observe_beside_others()).
+// By the clocks of both observers. If they differ, it is waited for in vain, or not, and what it
+// has not corrected yet stays as it is (observe_beside_others()).
 bool ObserveTask::is_under_way(const std::string& source, Clock::time_point now) const {
   if (std::count(settled_.begin(), settled_.end(), source) > 0) return false;
   const auto own = begin_of(source_);

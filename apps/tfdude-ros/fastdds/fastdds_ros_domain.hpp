@@ -19,6 +19,7 @@ class Bridges {
   using Prefix = fastdds::ertps::GuidPrefix_t;
 
   void met(const Prefix& prefix, const std::string& name, const std::vector<std::uint8_t>& data);
+  void changed(const Prefix&, const std::string&, const std::vector<std::uint8_t>&) {}
   void left(const Prefix& prefix);
   void authenticated(const Prefix&, bool) {}
   void writer_found(const fastdds::ertps::GUID_t&, const std::vector<std::string>&) {}
