@@ -120,9 +120,9 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
   discovery.m_DiscoveryServers = {server};
 }
 
-/// Reports participants: met(guid prefix, name, user data), left(guid prefix), authenticated(guid
-/// prefix, verified); and writers: writer_found(guid, DDS partitions), writer_lost(guid). A writer
-/// is reported before it is matched.
+/// Reports participants: met(guid prefix, name, user data), changed(the same, when that changes),
+/// left(guid prefix), authenticated(guid prefix, verified); and writers: writer_found(guid, DDS
+/// partitions), writer_lost(guid). A writer is reported before it is matched.
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:

@@ -55,6 +55,10 @@ void FairShare::count(Clock::time_point now) {
   }
 }
 
+bool FairShare::is_due(const Account& account, Clock::time_point now) {
+  return account.last < kCheap && now - account.at >= kDeafFor;
+}
+
 bool FairShare::drop() {
   const std::uint64_t before = dropped_.fetch_add(1, std::memory_order_relaxed);
   if ((before & (before + 1)) == 0) {  // the 1st, 2nd, 4th, 8th...
@@ -71,7 +75,8 @@ bool FairShare::admits_idle(Sender sender, Clock::time_point now) {
   }
   const Lock lock(mutex_);
   const auto known = accounts_.find(sender);
-  return known == accounts_.end() || owed(known->second, now) <= kGraceSeconds;
+  return known == accounts_.end() || is_due(known->second, now) ||
+         owed(known->second, now) <= kGraceSeconds;
 }
 
 bool FairShare::admits(Sender sender, Clock::time_point now) {
@@ -79,7 +84,7 @@ bool FairShare::admits(Sender sender, Clock::time_point now) {
   {
     const Lock lock(mutex_);
     const auto known = accounts_.find(sender);
-    if (known == accounts_.end()) return true;
+    if (known == accounts_.end() || is_due(known->second, now)) return true;
     if (now - counted_ > kRecountEvery || now < counted_) count(now);
     const double taken = owed(known->second, now);
     const int heavy = std::max(1, heavy_ + (taken > kLight * kMemorySeconds ? 0 : 1));
@@ -104,6 +109,7 @@ void FairShare::spent(Sender sender, Clock::duration time, Clock::time_point now
                           : std::max(owed_before, kMemorySeconds);
   account.seconds = counts ? std::min(owed_before + seconds, most) : owed_before;
   account.at = now;
+  account.last = time;
   if (counts) account.active = now;
   if (account.seconds > kGraceSeconds) {
     // At least for as long as it takes to pay it back.

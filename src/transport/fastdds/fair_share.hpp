@@ -36,7 +36,11 @@ class FairShare {
   /// If none wait: who has requests of such a size has seldom.
   static constexpr std::chrono::milliseconds kGrace{250};
   /// What is owed at most.
-  static constexpr std::chrono::seconds kMostOwed{1};
+  static constexpr std::chrono::milliseconds kMostOwed{500};
+  /// Of a sender of messages that take less than kCheap, one is handled after such a time in any
+  /// case: whoever repeats a request is answered, however many send.
+  static constexpr std::chrono::milliseconds kDeafFor{100};
+  static constexpr std::chrono::milliseconds kCheap{5};
   /// The share of all heavy senders together. The rest of the time is for the others, and for
   /// dropping.
   static constexpr double kShare = 0.5;
@@ -68,6 +72,7 @@ class FairShare {
   struct Account {
     double seconds = 0;
     Clock::time_point at;
+    Clock::duration last{};  // what its last message took
     double allowance = kAllowance;
     Clock::time_point active{};  // when something was charged last
   };
@@ -78,6 +83,7 @@ class FairShare {
   };
 
   /// What it owes now [s].
+  [[nodiscard]] static bool is_due(const Account& account, Clock::time_point now);
   [[nodiscard]] double owed(const Account& account, Clock::time_point now) const
       TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool admits_idle(Sender sender, Clock::time_point now);

@@ -1,5 +1,9 @@
 #include "transport/fastdds/fair_share.hpp"
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 #include "support/catch.hpp"
 
 namespace tfdude::fastdds {
@@ -153,6 +157,26 @@ TEST_CASE("fair share: costly messages are not dropped while their sender is wit
     const double share = beside_pauses(cost, 2 * cost).share;
     CHECK(share > 0.3);
   }
+}
+
+// Before, one of eight was dropped for ten seconds, with all that it repeated.
+TEST_CASE("fair share: who sends many small messages is handled again soon, however many do") {
+  Thread thread;
+  constexpr std::size_t kSenders = 8;
+  std::array<FairShare::Clock::time_point, kSenders> last{};
+  last.fill(thread.now);
+  FairShare::Clock::duration longest{0};
+  const auto start = thread.now;
+  for (std::size_t i = 0; thread.now - start < 30s; ++i) {
+    // One after the other sends the most.
+    const std::size_t one = (i % 4 == 0 ? i / 4 : i / 20'000) % kSenders;
+    // Some are interrupted.
+    const auto time = i % 50 == 0 ? 4ms : 100us;
+    if (!thread.handle(kFlood + one, time, 1us)) continue;
+    longest = std::max(longest, thread.now - std::exchange(last[one], thread.now));
+  }
+  CHECK(thread.shares.dropped() > 1000);
+  CHECK(longest < 200ms);
 }
 
 TEST_CASE("fair share: what was taken alone is not owed") {
