@@ -301,22 +301,31 @@ std::vector<CorrectedError> corrected_many(const JointPrior& prior, const Linear
   return corrected;
 }
 
+// The edges and, last, the one that is determined: with the noise of the measurement, and with what
+// the sources of the others cause in it.
+// @param left  null: as carry()
+std::vector<CorrectedError> carried(const JointPrior& prior, const LinearPath& linear,
+                                    const Matrix6d& G, const Loading& noise, Left* left) {
+  std::vector<CorrectedError> determined;
+  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
+  determined.push_back({noise * noise.transpose(), {}});
+  for (const JointPrior::Source& source : prior.sources()) {
+    std::vector<Loading> loadings = source.loadings;
+    loadings.emplace_back(-G * source.on_path(prior, linear.H));
+    carry(source, loadings, left, determined);
+  }
+  return determined;
+}
+
 // As determined_errors(), if there are many columns, which all add: those of the edge follow from
 // them.
 std::vector<CorrectedError> determined_many(const JointPrior& prior, const LinearPath& linear,
                                             const Matrix6d& G, const Loading& noise,
                                             Eigen::Index before, const std::string& new_source) {
   const std::size_t count = prior.edges().size();
-  std::vector<CorrectedError> determined;
-  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
-  determined.push_back({noise * noise.transpose(), {}});
-  Left left{JointCovariance(determined.size()), {}};
+  Left left{JointCovariance(count + 1), {}};
   JointCovariance& observed = left.observed;
-  for (const JointPrior::Source& source : prior.sources()) {
-    std::vector<Loading> loadings = source.loadings;
-    loadings.emplace_back(-G * source.on_path(prior, linear.H));
-    carry(source, loadings, &left, determined);
-  }
+  std::vector<CorrectedError> determined = carried(prior, linear, G, noise, &left);
   for (std::size_t i = 0; i < count; ++i) {
     const Matrix6d& H = linear.H[prior.edges()[i]];
     const Loading& root = prior.own_roots()[i];
@@ -390,17 +399,9 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
   if (const Eigen::Index many = merge ? many_columns(prior) : 0; many > 0) {
     return determined_many(prior, linear, G, G * R, many, new_source);
   }
-  std::vector<CorrectedError> determined;
-  for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
-  const Loading noise = G * R;
-  determined.push_back({noise * noise.transpose(), {}});
-  Left left{JointCovariance(determined.size()), {}};
+  Left left{JointCovariance(prior.edges().size() + 1), {}};
   JointCovariance& observed = left.observed;
-  for (const JointPrior::Source& source : prior.sources()) {
-    std::vector<Loading> loadings = source.loadings;
-    loadings.emplace_back(-G * source.on_path(prior, linear.H));
-    carry(source, loadings, merge ? &left : nullptr, determined);
-  }
+  auto determined = carried(prior, linear, G, G * R, merge ? &left : nullptr);
   const Factor whole(prior.own_on_path(linear.H));
   if (whole.rank() > 0) {
     couple(prior, linear.H, whole, determined.size() - 1, G, whole.root(),

@@ -1,7 +1,6 @@
 #include "tfdude/math/fusion.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
@@ -28,9 +27,8 @@ struct Gaussian {
 
 // The information of an estimate about δ in X_true = X Exp(δ): Log(Xₖ⁻¹ X Exp(δ)) = e + Jr⁻¹(e) δ
 // has mean zero, and Jr(e) e = e.
-Gaussian seen_from(const Pose& X, const Transform& stated) {
-  const Loading root = root_of(stated.covariance.of_specified().matrix());
-  const Measured estimate = with_unknown_rotation_of(X, {stated.pose, root});
+Gaussian seen_from(const Pose& X, const Measured& stated) {
+  const Measured estimate = with_unknown_rotation_of(X, stated);
   const Twist e = log(estimate.X_AB.inverse() * X);
   return {-e, right_jacobian(e) * estimate.root};
 }
@@ -46,20 +44,27 @@ bool merge(Gaussian& sum, const Gaussian& more, double reach) {
   return true;
 }
 
-double reach_of(const std::vector<Transform>& estimates) {
+std::vector<Measured> with_roots(const std::vector<Transform>& estimates) {
+  std::vector<Measured> all;
+  for (const Transform& one : estimates) {
+    all.push_back({one.pose, root_of(one.covariance.of_specified().matrix())});
+  }
+  return all;
+}
+
+double reach_of(const std::vector<Measured>& estimates) {
   double reach = 0;
-  for (const Transform& one : estimates) reach = std::max(reach, one.pose.translation().norm());
+  for (const Measured& one : estimates) reach = std::max(reach, one.X_AB.translation().norm());
   return reach;
 }
 
 // What rounding hides of a step. A deviation of kilometres costs the other axes of an estimate that
 // is turned their last digits.
-Twist rounding_of(const std::vector<Transform>& estimates, double reach) {
+Twist rounding_of(const std::vector<Measured>& estimates, double reach) {
   constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
   double widest = 0;
-  for (const Transform& one : estimates) {
-    const Twist variances = one.covariance.of_specified().matrix().diagonal();
-    widest = std::max(widest, std::sqrt(variances.head<3>().maxCoeff()));
+  for (const Measured& one : estimates) {
+    widest = std::max(widest, one.root.topRows<3>().rowwise().norm().maxCoeff());
   }
   Twist hidden;
   hidden << Eigen::Vector3d::Constant(kFusionConverged * reach + kDigits * widest),
@@ -89,17 +94,18 @@ Result<void> check_complete(const std::vector<Transform>& estimates) {
 
 }  // namespace
 
-Result<Fused> fuse(const std::vector<Transform>& estimates) {
-  if (estimates.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
-  if (auto ok = check_complete(estimates); !ok) return tl::unexpected(std::move(ok.error()));
+Result<Fused> fuse(const std::vector<Transform>& stated) {
+  if (stated.empty()) return fail(Errc::kInvalidInput, "no estimate to fuse");
+  if (auto ok = check_complete(stated); !ok) return tl::unexpected(std::move(ok.error()));
+  const std::vector<Measured> estimates = with_roots(stated);
   const double reach = reach_of(estimates);
   const Twist hidden = rounding_of(estimates, reach);
   // What knows nothing of a rotation would cost the others their digits.
   std::size_t first = 0;
   for (std::size_t k = estimates.size(); k-- > 0;) {
-    if (unknown_rotations(root_of(estimates[k].covariance.of_specified().matrix())) == 0) first = k;
+    if (unknown_rotations(estimates[k].root) == 0) first = k;
   }
-  Pose X = estimates[first].pose;
+  Pose X = estimates[first].X_AB;
   for (int iteration = 1; iteration <= kMostFusions; ++iteration) {
     Gaussian sum = seen_from(X, estimates[first]);
     for (std::size_t k = 0; k < estimates.size(); ++k) {

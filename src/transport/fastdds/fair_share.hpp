@@ -82,8 +82,9 @@ class FairShare {
     Clock::time_point at{};
   };
 
-  /// What it owes now [s].
+  /// Whether one is to be handled in any case (kDeafFor).
   [[nodiscard]] static bool is_due(const Account& account, Clock::time_point now);
+  /// What it owes now [s].
   [[nodiscard]] double owed(const Account& account, Clock::time_point now) const
       TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool admits_idle(Sender sender, Clock::time_point now);
