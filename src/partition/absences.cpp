@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <tuple>
+#include <utility>
 
 namespace tfdude {
 
@@ -23,7 +24,7 @@ void Absences::limit(const std::string& kept) {
     const std::int64_t since = missed.absent.since;
     if (entry.first == kept) return std::pair(4, since);
     if (!missed.teller.empty()) return std::pair(0, since);
-    if (missed.pending) return std::pair(3, since);
+    if (missed.pending && missed.absent.kind != Absent::Kind::kBack) return std::pair(3, since);
     return contests_(entry.first) ? std::pair(2, ~since) : std::pair(1, since);
   };
   auto least = missed_.begin();
@@ -40,7 +41,8 @@ void Absences::mark_absent(const std::string& partition, std::uint64_t incarnati
   const Absent::Kind then = stopped ? Absent::Kind::kStopped : Absent::Kind::kLost;
   // An earlier absence that is not resolved stays unresolved.
   const auto before = missed_.find(partition);
-  const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack;
+  const bool again = before != missed_.end() && before->second.absent.kind == Absent::Kind::kBack &&
+                     !before->second.pending;
   put(partition, incarnation, now, again ? then : Absent::Kind::kSilent, then);
   missed_.at(partition).early = early;
 }
@@ -101,6 +103,7 @@ bool Absences::returned(const std::string& partition) {
   const auto there = missed_.find(partition);
   if (there == missed_.end()) return false;
   Missed& missed = there->second;
+  if (missed.absent.kind == Absent::Kind::kBack) return true;
   if (survived(missed.absent.kind)) {
     missed.absent.kind = Absent::Kind::kBack;
     missed.pending = false;
@@ -110,11 +113,11 @@ bool Absences::returned(const std::string& partition) {
   return true;
 }
 
-void Absences::resolved(const std::string& partition) {
+void Absences::set_resolved(const std::string& partition, bool resolved) {
   const auto there = missed_.find(partition);
-  if (there != missed_.end() && there->second.absent.kind == Absent::Kind::kBack) {
-    missed_.erase(there);
-  }
+  if (there == missed_.end() || there->second.absent.kind != Absent::Kind::kBack) return;
+  Missed& missed = there->second;
+  if (std::exchange(missed.pending, resolved) != resolved) missed.noticed.reset();
 }
 
 void Absences::forget(const std::string& partition, std::uint64_t incarnation, Time now) {
@@ -125,28 +128,41 @@ void Absences::forget(const std::string& partition, std::uint64_t incarnation, T
   put(partition, incarnation, now, Absent::Kind::kForgotten, Absent::Kind::kForgotten);
 }
 
+bool Absences::advance(Missed& missed, Steady now, bool hung, Looked& looked) {
+  const bool silent = missed.absent.kind == Absent::Kind::kSilent;
+  const bool back = missed.absent.kind == Absent::Kind::kBack;
+  if (!missed.noticed) missed.noticed = now;
+  if (hung) missed.noticed = silent || back ? now : std::max(*missed.noticed, now - kGrace);
+  const auto passed = now - *missed.noticed;
+  if (back) {
+    missed.pending = passed < kGrace;
+    looked.counts = looked.counts || !missed.pending;
+    return !missed.pending;
+  }
+  if (silent && missed.then != Absent::Kind::kSilent && passed >= kGrace) {
+    missed.absent.kind = missed.then;
+    missed.teller.clear();
+    looked.counts = true;
+  }
+  missed.pending = missed.absent.kind == Absent::Kind::kSilent || passed < kTakeover + missed.early;
+  return !missed.pending;
+}
+
 Absences::Looked Absences::look(Steady now) {
   // A process that has not called this for so long has hung: it cannot tell who was reachable
   // meanwhile.
   const bool hung = looked_ && now - *looked_ > kGrace / 2;
   looked_ = now;
   Looked looked;
-  for (auto& [name, missed] : missed_) {
-    if (!missed.pending) continue;
-    const bool silent = missed.absent.kind == Absent::Kind::kSilent;
-    if (!missed.noticed) missed.noticed = now;
-    if (hung) missed.noticed = silent ? now : std::max(*missed.noticed, now - kGrace);
-    if (silent && missed.then != Absent::Kind::kSilent && now - *missed.noticed >= kGrace) {
-      missed.absent.kind = missed.then;
-      missed.teller.clear();
-      looked.counts = true;
-    }
-    if (missed.absent.kind == Absent::Kind::kSilent ||
-        now - *missed.noticed < kTakeover + missed.early) {
+  for (auto one = missed_.begin(); one != missed_.end();) {
+    const auto& [name, missed] = *one;
+    const bool ends = missed.pending && advance(one->second, now, hung, looked);
+    if (ends && missed.absent.kind == Absent::Kind::kBack) {
+      one = missed_.erase(one);
       continue;
     }
-    missed.pending = false;
-    looked.gone.push_back(name);
+    if (ends) looked.gone.push_back(name);
+    ++one;
   }
   return looked;
 }

@@ -71,14 +71,16 @@ class Absences {
   /// The partition is reachable. @return whether it was missed
   bool returned(const std::string& partition);
 
-  /// For a returned partition: this participant no longer holds anything that it claims.
-  void resolved(const std::string& partition);
+  /// Whether this participant holds nothing any more that a returned partition claims. It is told
+  /// as survived for kGrace from then on: otherwise whoever hears that before the last words of the
+  /// returned partition would take its earlier claims for valid again.
+  void set_resolved(const std::string& partition, bool resolved);
 
   /// Drops everything about an unreachable partition.
   void forget(const std::string& partition, std::uint64_t incarnation, Time now);
 
   struct Looked {
-    bool counts = false;            ///< an absence counts now that did not before
+    bool counts = false;            ///< an absence counts now that did not before, or no more
     std::vector<std::string> gone;  ///< partitions now absent for kTakeover
   };
   /// Call at least twice per kGrace while any_pending(); longer gaps between calls do not count.
@@ -104,14 +106,16 @@ class Absences {
   struct Missed {
     Absent absent;
     Absent::Kind then{};            // what a silence becomes; kSilent: the teller does not know yet
-    std::optional<Steady> noticed;  // of a silence
+    std::optional<Steady> noticed;  // of a silence, or of a return that is resolved
     std::string teller{};           // of hearsay, which is not passed on
-    bool pending = false;           // until it counts as gone
+    bool pending = false;           // until it counts as gone, or no more as survived
     bool relied_on = false;         // messages were dropped because of it
     std::chrono::nanoseconds early{};
   };
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);
+  /// @return whether it is not pending any more
+  bool advance(Missed& missed, Steady now, bool hung, Looked& looked);
   /// @param kept  the one entry that stays in any case
   void limit(const std::string& kept);
 

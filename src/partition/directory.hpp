@@ -210,9 +210,9 @@ class Directory {
   /// The name of a reachable partition with an announced change that has not come yet; null: none.
   [[nodiscard]] const std::string* behind() const;
 
-  /// Forgets the absence of partitions that are back and of which nothing is contested any more.
-  /// Called after each input: a message, or a change of own frames. @return whether there were any
-  bool resolve_returns();
+  /// Finds the partitions that are back and of which nothing is contested any more: after a while
+  /// their absence is forgotten. Called after each input: a message, or a change of own frames.
+  void resolve_returns();
   /// The partitions that this participant misses, for its presence.
   [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 

@@ -327,19 +327,15 @@ std::optional<std::uint64_t> Directory::hidden_by(std::uint64_t own) const {
 
 // A return is resolved once all claims of the partition have come, and none of its frames is held
 // here.
-bool Directory::resolve_returns() {
-  bool resolved = false;
+void Directory::resolve_returns() {
   for (const std::string& name : absences_.back()) {
     const auto number = number_of(name);
     if (!number) continue;
     const Known& partition = partitions_[*number];
-    if (!partition.info.reachable || partition.announced != partition.live) continue;
-    if (!partition.complete() || claims_.contests_held(*number)) continue;
-    absences_.resolved(name);
-    resolved = true;
+    absences_.set_resolved(name, partition.info.reachable &&
+                                     partition.announced == partition.live &&
+                                     partition.complete() && !claims_.contests_held(*number));
   }
-  if (resolved) tell_claims();
-  return resolved;
 }
 
 std::vector<Owner> Directory::reachable_owners() const {

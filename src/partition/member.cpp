@@ -36,7 +36,6 @@ void Member::on_presence(const Presence& presence, Time now) {
   // Its pages may have come before.
   if (!was_announced && directory_.announced(presence.partition)) outcome_.appeared = presence;
   if (was_reachable && !directory_.serving(presence.partition)) outcome_.stopped = presence;
-  outcome_.look_for_gone = directory_.any_pending();
   overtake(now);
   if (partition_ != nullptr) outcome_.to_commit = true;
   look_for_contests();
@@ -64,7 +63,6 @@ void Member::on_lost(const std::string& partition, std::uint64_t incarnation, Ti
   }
   if (!directory_.lost(partition, incarnation, now, early)) return;
   outcome_.lost = partition;
-  outcome_.look_for_gone = true;
   if (partition_ != nullptr) outcome_.to_commit = true;
 }
 
@@ -75,9 +73,7 @@ void Member::on_time(Steady now) {
     outcome_.to_commit = true;
     look_for_contests();
   }
-  const bool gone = directory_.look_for_gone(now);
-  outcome_.look_for_gone = directory_.any_pending();
-  if (!gone) return;
+  if (!directory_.look_for_gone(now)) return;
   outcome_.heard = true;
   if (partition_ != nullptr) outcome_.to_commit = true;
 }
@@ -279,7 +275,8 @@ Outcome Member::take_outcome() {
     if (partition_->awaits_time()) outcome_.look_for_gone = true;
   }
   // A frame that was yielded or removed here may have been the last one that was contested.
-  if (directory_.resolve_returns() && partition_ != nullptr) outcome_.to_commit = true;
+  directory_.resolve_returns();
+  if (directory_.any_pending()) outcome_.look_for_gone = true;
   compare_plans();
   outcome_.outdated = directory_.take_outdated();
   outcome_.cut = directory_.take_cut();

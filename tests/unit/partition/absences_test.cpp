@@ -144,7 +144,7 @@ TEST_CASE("frames of a lost partition are routed to another only after the takeo
   SECTION("it returns before") {
     base.directory.apply(presence_of("arm", 1, 2), kNow);
     CHECK(base.directory.absent()[0].kind == Kind::kBack);
-    CHECK_FALSE(base.directory.any_pending());
+    CHECK_FALSE(base.directory.any_pending());  // it has announced more than has come
     CHECK_FALSE(base.directory.look_for_gone(kStart + Absences::kTakeover));
     CHECK(base.owner_of("hand") == "arm");
   }
@@ -273,6 +273,13 @@ TEST_CASE("an owner keeps a frame that an unreachable partition claims when that
   CHECK(replica.directory.absent()[0].kind == Kind::kBack);
   // Until the returning partition has yielded.
   replica.directory.apply(page_of("arm", {}, 7));
+  const Absences::Steady yielded = kStart + 2 * Absences::kGrace;
+  CHECK_FALSE(replica.directory.look_for_gone(yielded));
+  CHECK_FALSE(replica.directory.look_for_gone(yielded + Absences::kGrace / 2));
+  CHECK(replica.directory.absent().size() == 1);
+  // A presence that is repeated meanwhile does not prolong it.
+  replica.directory.apply(presence_of("arm", 7, 1), kNow);
+  CHECK(replica.directory.look_for_gone(yielded + Absences::kGrace));
   CHECK(replica.directory.absent().empty());
   CHECK(replica.forest.holds("hand"));
 }
@@ -411,6 +418,8 @@ TEST_CASE("a late page of an earlier process does not keep the structure incompl
   client.directory.apply(page_of("arm", {{"hand", "", 10}, {"old", "hand", 5}}, 2));
   client.hear("arm", 3, 10);
   CHECK(client.directory.complete());
+  for (int k = 4; k <= 6; ++k)
+    (void)client.directory.look_for_gone(kStart + k * Absences::kGrace / 2);
   CHECK(client.directory.absent().empty());
   CHECK_FALSE(client.forest.exists("old"));
 }

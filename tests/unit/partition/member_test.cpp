@@ -447,6 +447,12 @@ TEST_CASE("member: an absence ends with the last contested frame, without anothe
   CHECK(arms.directory.absent()[0].kind == Absent::Kind::kBack);
   (void)arms.member.stored(arms.member.take_ready());
   REQUIRE(arms.member.release({"toe"}, kNow));
+  CHECK(arms.member.take_outcome().look_for_gone);
+  const Absences::Steady start{Absences::kTakeover + Absences::kGrace};
+  for (auto after = Milliseconds(0); after <= Absences::kGrace; after += Milliseconds(100)) {
+    (void)arms.member.take_outcome();
+    arms.member.on_time(start + after);
+  }
   CHECK(arms.member.take_outcome().to_commit);
   const Ready ready = arms.member.take_ready();
   REQUIRE(ready.presence);

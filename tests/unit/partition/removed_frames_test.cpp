@@ -28,6 +28,7 @@ using Lines = std::vector<std::string>;
 using Kind = Absent::Kind;
 
 constexpr Time kNow = StoringOwner::kNow;
+constexpr Absences::Steady kStart{};
 
 Presence said_by(const std::string& partition, std::vector<Absent> absent = {}) {
   Presence presence = presence_of(partition, 1, 1);
@@ -94,6 +95,29 @@ TEST_CASE("whether a frame was removed does not depend on the order of messages"
   } while (std::next_permutation(order.begin(), order.end()));
 }
 
+TEST_CASE(
+    "a removed frame stays removed if its remover is heard before the last words of its owner") {
+  MemoryStore store;
+  StoringOwner left_arm("left_arm", &store);
+  left_arm.directory.restore({{"arm", 0, Kind::kLost, 1}});
+  left_arm.start({{"hand", "", along_x(1)}});
+  REQUIRE(left_arm.ask("hand", RemoveRequest{{"hand"}}) == "ok");
+  Replica client;
+  const auto tell = [&] {
+    for (const Page& page : left_arm.partition.take_pages()) client.directory.apply(page);
+    client.directory.apply(said_by("left_arm", left_arm.directory.absent()), kNow);
+  };
+  tell();
+  client.directory.apply(presence_of("arm", 2, 1), kNow);
+  client.directory.apply(Page{"arm", 0, 2, 3, {{"hand", "", 10}}});
+  left_arm.directory.apply(presence_of("arm", 2, 1), kNow);
+  left_arm.directory.apply(Page{"arm", 0, 2, 3, {{"hand", "", 10}}});
+  REQUIRE(client.structure().empty());
+  left_arm.directory.apply(Page{"arm", 0, 2, 4, {}});
+  tell();
+  CHECK(client.structure().empty());
+}
+
 TEST_CASE("a removal by a partition that was not missing the owner ends no claim") {
   Replica replica;
   replica.directory.apply(presence_of("arm", 1, 1), kNow);
@@ -128,6 +152,11 @@ TEST_CASE("a partition that removed a frame that it had taken over knows no othe
   // Until it has withdrawn its claim, it is told that it has to.
   CHECK(left_arm->directory.absent().size() == 1);
   left_arm->directory.apply(Page{"arm", 0, 2, 4, {}});
+  // And for a while longer, for those who have not heard that it has.
+  CHECK_FALSE(left_arm->directory.look_for_gone(kStart));
+  CHECK_FALSE(left_arm->directory.look_for_gone(kStart + Absences::kGrace / 2));
+  CHECK(left_arm->directory.absent().size() == 1);
+  CHECK(left_arm->directory.look_for_gone(kStart + Absences::kGrace));
   CHECK(left_arm->directory.absent().empty());
   left_arm->directory.apply(Page{"arm", 0, 2, 5, {{"hand", "", 10}}});
   CHECK(left_arm->structure() == Lines{"hand <  @ arm"});
