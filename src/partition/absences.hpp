@@ -115,7 +115,7 @@ class Absences {
   void put(const std::string& partition, std::uint64_t incarnation, Time now, Absent::Kind kind,
            Absent::Kind then);
   /// @return whether it is not pending any more
-  bool advance(Missed& missed, Steady now, bool hung, Looked& looked);
+  static bool advance(Missed& missed, Steady now, bool hung, Looked& looked);
   /// @param kept  the one entry that stays in any case
   void limit(const std::string& kept);
 

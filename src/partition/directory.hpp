@@ -326,7 +326,7 @@ class Directory {
   [[nodiscard]] Successor structure_in_force(const Known& partition, Owner owner);
   [[nodiscard]] std::optional<Successor> structure_of_live(const Known& partition, Owner owner);
   /// Of several, the latest. What is kept was there before, so this takes no more room.
-  void keep_for_return(Known& partition, Successor structure);
+  static void keep_for_return(Known& partition, Successor structure);
   void tell_claims();
   static Successor* succeed(Known& partition, std::uint64_t incarnation);
   void replace_if_complete(Known& partition, Owner owner);
