@@ -300,6 +300,30 @@ TEST_CASE("waiting: a filter passes messages on when their transform can be had"
   CHECK(filter.waiting() == 4);
 }
 
+TEST_CASE("waiting: who waited only for a displaced message is passed on with it") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(0), instant(0)));
+  Passed passed;
+  std::unique_ptr<MessageFilter<int>> filter;
+  filter = std::make_unique<MessageFilter<int>>(
+      world.client, MessageFilterOptions{"world", 20s, 2, true},
+      [&](int message, const StampedTransform&) { passed.add(std::to_string(message)); },
+      [&](int message, const Error&) {
+        passed.add("no " + std::to_string(message));
+        if (message == 4) filter.reset();
+      });
+  filter->push(1, "tip", instant(100));
+  filter->push(2, "tip", instant(0));
+  filter->push(3, "tip", instant(100));  // the answer for 2 may have come before
+  REQUIRE(passed.gets(2));
+  CHECK(passed.now() == std::vector<std::string>{"no 1", "2"});
+  filter->push(4, "tip", instant(100));
+  filter->push(5, "tip", instant(100));  // displaces 3
+  filter->push(6, "tip", instant(100));
+  CHECK(filter == nullptr);
+  CHECK(passed.now().back() == "no 4");
+}
+
 TEST_CASE("waiting: a filter drops messages by their age, and says what was missing") {
   World world;
   Passed passed;

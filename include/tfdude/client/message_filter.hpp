@@ -33,8 +33,8 @@ struct MessageFilterOptions {
 ///
 /// Each message is passed to one of the two functions once, unless the filter is destroyed before.
 /// Both are called by threads of the library that hold no lock, one call at a time; but by push()
-/// for a message that a newer one displaces (kTooMuch). They may call any function, and destroy the
-/// filter; they must not throw.
+/// for a message that a newer one displaces (kTooMuch), and those that only waited for it. They may
+/// call any function, and destroy the filter; they must not throw.
 /// @par Attach and detach  As PendingLookup: after ~MessageFilter has returned, no function is
 ///   running and none will run, except one that calls it. The client must outlive the filter.
 /// @par Thread safety  push() may be called by any thread, and by the functions.
@@ -59,15 +59,14 @@ class MessageFilter {
   /// Passes a message on as soon as its transform is there. Does not wait for anything.
   void push(Message message, const std::string& frame, Time stamp) {
     auto entry = std::make_shared<Entry>(std::move(message));
-    state_->add(entry, options_.most);
+    const std::shared_ptr<State> state = state_;
+    if (!state->add(entry, options_.most)) return;
     Query query = options_.query;
     query.at = stamp;
-    PendingLookup lookup =
-        client_.lookup_async(options_.target, frame, query, options_.max_age,
-                             [state = state_, entry](Result<StampedTransform> X_TF) {
-                               state->take(entry, std::move(X_TF));
-                             });
-    state_->started(*entry, lookup);
+    PendingLookup lookup = client_.lookup_async(
+        options_.target, frame, query, options_.max_age,
+        [state, entry](Result<StampedTransform> X_TF) { state->take(entry, std::move(X_TF)); });
+    state->started(*entry, lookup);
   }
 
   /// The number of messages that wait for their transform, or for those before them.
@@ -91,26 +90,30 @@ class MessageFilter {
     State(OnReady on_ready, OnDropped on_dropped, bool in_order)
         : on_ready_(std::move(on_ready)), on_dropped_(std::move(on_dropped)), in_order_(in_order) {}
 
-    void add(const EntryPtr& entry, std::size_t most) {
+    /// @return false: a function that it has called has destroyed the filter
+    bool add(const EntryPtr& entry, std::size_t most) {
       EntryPtr displaced;
       PendingLookup cancelled;
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        if (waiting_.size() >= std::max<std::size_t>(most, 1)) {
-          displaced = std::move(waiting_.front());
-          waiting_.pop_front();
-          displaced->over = true;
-          cancelled = std::move(displaced->lookup);
-          active_.erase(displaced);
-        }
-        waiting_.push_back(entry);
-        active_.insert(entry);
+      std::unique_lock<std::mutex> lock(mutex_);
+      if (waiting_.size() >= std::max<std::size_t>(most, 1)) {
+        displaced = std::move(waiting_.front());
+        waiting_.pop_front();
+        displaced->over = true;
+        cancelled = std::move(displaced->lookup);
+        active_.erase(displaced);
       }
-      if (!displaced) return;
+      waiting_.push_back(entry);
+      active_.insert(entry);
+      if (!displaced) return true;
+      lock.unlock();
       cancelled.cancel();
-      if (!on_dropped_) return;
-      on_dropped_(std::move(displaced->message),
-                  Error{Errc::kTooMuch, "more than " + std::to_string(most) + " messages wait"});
+      if (on_dropped_) {
+        on_dropped_(std::move(displaced->message),
+                    Error{Errc::kTooMuch, "more than " + std::to_string(most) + " messages wait"});
+      }
+      lock.lock();
+      pass_on(lock);
+      return !closed_;
     }
 
     // The lookup has begun, and may have ended already.
@@ -124,25 +127,11 @@ class MessageFilter {
       if (closed_ || entry->over) return;
       entry->X_TF = std::move(X_TF);
       entry->answered = true;
-      if (in_order_) {
-        while (!waiting_.empty() && waiting_.front()->answered) {
-          ready_.push_back(std::move(waiting_.front()));
-          waiting_.pop_front();
-        }
-      } else {
+      if (!in_order_) {
         waiting_.erase(std::find(waiting_.begin(), waiting_.end(), entry));
         ready_.push_back(entry);
       }
-      // One thread at a time passes on what is ready.
-      while (!delivering_ && !ready_.empty() && !closed_) {
-        const EntryPtr next = std::move(ready_.front());
-        ready_.pop_front();
-        delivering_ = true;
-        lock.unlock();
-        deliver(*next);
-        lock.lock();
-        delivering_ = false;
-      }
+      pass_on(lock);
       entry->over = true;
       active_.erase(entry);
       const PendingLookup own = std::move(entry->lookup);
@@ -169,6 +158,23 @@ class MessageFilter {
     }
 
    private:
+    // One thread at a time passes on what is ready.
+    void pass_on(std::unique_lock<std::mutex>& lock) {
+      while (in_order_ && !waiting_.empty() && waiting_.front()->answered) {
+        ready_.push_back(std::move(waiting_.front()));
+        waiting_.pop_front();
+      }
+      while (!delivering_ && !ready_.empty() && !closed_) {
+        const EntryPtr next = std::move(ready_.front());
+        ready_.pop_front();
+        delivering_ = true;
+        lock.unlock();
+        deliver(*next);
+        lock.lock();
+        delivering_ = false;
+      }
+    }
+
     void deliver(Entry& entry) {
       if (entry.X_TF) {
         on_ready_(std::move(entry.message), *entry.X_TF);
