@@ -316,3 +316,37 @@ def test_calls_of_several_requests_wait_for_an_owner_that_leaves_and_returns(net
         finally:
             stop.set()
             thread.join()
+
+
+def test_an_algorithm_is_written_once_for_all_that_answers_lookups(network, car):
+    def end(frames: tfdude.FrameSource, at=None):
+        return frames.lookup("odom", "lidar", at, timeout=5).translation
+
+    class Table(tfdude.FrameSource):
+        def __init__(self, X):
+            self.X = X
+
+        def lookup(self, a, b, at=None, *, timeout=0.0):
+            return self.X
+
+    with tfdude.Client(network=network) as client:
+        live = tfdude.FrameSource.of(client)
+        assert np.allclose(end(live), (10, 0, 1))
+        assert np.allclose(end(tfdude.FrameSource.of(car), START + 5 * MS), (0.5, 0, 1))
+        assert {frame.id for frame in live.frames()} == {"odom", "base", "lidar"}
+        moved = live.lookup_full("base", START, "base", START + 10 * MS, "odom")
+        assert np.allclose(moved.translation, (1, 0, 0))
+        edges = client.watch_edges(["base", "lidar"], timeout=5)
+        watched = tfdude.FrameSource.of(edges)
+        assert eventually(lambda: np.allclose(end(watched), (10, 0, 1)))
+        table = Table(live.lookup("odom", "lidar"))
+        assert tfdude.FrameSource.of(table) is table
+        assert np.allclose(end(table), (10, 0, 1))
+        for source in (watched, table):
+            with pytest.raises(tfdude.TransformException, match="does not tell its frames") as error:
+                source.frames()
+            assert error.value.code == "unsupported"
+        with pytest.raises(TypeError, match="not int"):
+            tfdude.FrameSource.of(7)
+    with pytest.raises(TypeError):
+        tfdude.FrameSource()

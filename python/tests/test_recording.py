@@ -9,6 +9,7 @@ import subprocess
 
 import numpy as np
 import pytest
+import tfdude
 from helpers import eventually
 
 from tfdude import ExtrapolationException, FrameSpec, LookupException, Node, Recording, Transform, TransformException
@@ -60,6 +61,14 @@ def test_a_recording_answers_as_the_live_system(recorded):
         assert np.allclose(X.matrix, live.matrix, atol=1e-12)
         assert np.allclose(X.covariance, live.covariance, atol=1e-15)
         assert X.stamp == at
+    frames = tfdude.FrameSource.of(recording)
+    assert np.allclose(frames.lookup("base", "hand", at).matrix, live.matrix, atol=1e-12)
+    recording.read_all()
+    assert np.allclose(frames.lookup("hand", "lamp").translation, (0, 0, 1))
+    assert {frame.id for frame in frames.frames()} == {"base", "hand", "lamp"}
+    first = sorted(answers)[50]  # when the recorder had samples
+    moved = frames.lookup_full("hand", first, "hand", at, "base").translation
+    assert np.allclose(moved, (0.01 * (at - first) / 10_000_000, 0, 0))
 
 
 def test_a_recording_has_structure_events_and_a_summary(recorded):

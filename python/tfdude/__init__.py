@@ -69,6 +69,7 @@ from ._errors import (
     UnspecifiedCovariance,
 )
 from ._filter import MessageFilter, filter_messages
+from ._source import FrameSource
 
 __all__ = [
     "Batch",
@@ -85,6 +86,7 @@ __all__ = [
     "Explanation",
     "ExtrapolationException",
     "Frame",
+    "FrameSource",
     "FrameSpec",
     "Geodetic",
     "GeodeticPose",
