@@ -73,6 +73,32 @@ Names unspecified_of(const Result<StampedTransform>& X) {
 
 }  // namespace
 
+TEST_CASE("unspecified: beyond a sample that an observation determined, the motion is not known") {
+  const Join join = testing::joined_by(GENERATE(from_range(testing::networks())));
+  FrameSpec moving{"cart", "world", {}};
+  moving.timing = EdgeTiming();
+  Node node = Node::open(join("robot"), "robot", {{"world", "", {}}, moving}).value();
+  Client client = Client::open(join("")).value();
+  const auto ahead = [](double x, const StatedCovariance& covariance) {
+    return Transform{Pose::trusted(Eigen::Quaterniond::Identity(), {x, 0, 0}), covariance};
+  };
+  const StatedCovariance known = Covariance::trusted(Matrix6d::Identity() * 1e-4);
+  const bool first_is_known = GENERATE(true, false);
+  REQUIRE(node.update("cart", ahead(0, first_is_known ? known : StatedCovariance::unspecified()),
+                      ms(100)));
+  REQUIRE(node.update("cart", ahead(1, StatedCovariance::unspecified()), ms(200)));
+  Query query;
+  query.at = ms(200);
+  REQUIRE(node.observe("world", "cart", ahead(1, known), query.at));
+  query.extrapolate = 1s;
+  for (Client* who : {&client, static_cast<Client*>(&node)}) {
+    query.at = ms(200);
+    CHECK(unspecified_of(who->lookup("world", "cart", query, 5s)).empty());
+    query.at = ms(300);
+    CHECK(unspecified_of(who->lookup("world", "cart", query, 5s)) == Names{"cart"});
+  }
+}
+
 TEST_CASE(
     "unspecified: a lookup names the edges of all owners and has the covariance of the rest") {
   const Join join = testing::join_loopback();
