@@ -48,7 +48,8 @@ inline void check(const Result<void>& result) {
 [[nodiscard]] double to_seconds(std::chrono::nanoseconds duration);
 
 /// What a covariance is given as: None or "unspecified", "exact", 6x6, or 21 of the upper triangle.
-[[nodiscard]] StatedCovariance to_covariance(py::handle covariance);
+[[nodiscard]] StatedCovariance to_covariance(py::handle covariance,
+                                             const char* name = "covariance");
 
 /// Of 2 or 4.
 [[nodiscard]] Order to_order(int order);

@@ -31,7 +31,12 @@ void bind_earth(py::module_& module) {
            }),
            py::arg("latitude"), py::arg("longitude"), py::arg("altitude") = 0.0)
       .def_static(
-          "from_ecef", [](py::handle point) { return geodetic_of(to_vector3(point, "point")); },
+          "from_ecef",
+          [](py::handle point) {
+            const Geodetic place = geodetic_of(to_vector3(point, "point"));
+            check(check_geodetic(place));
+            return place;
+          },
           py::arg("point"), "Of a point (3,) of an earth frame [m].")
       .def_readonly("latitude", &Geodetic::latitude)
       .def_readonly("longitude", &Geodetic::longitude)

@@ -44,7 +44,7 @@ EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> co
   if (!span.is_none()) timing.span = to_duration(span, "span");
   if (count) timing.count = *count;
   if (!process_noise.is_none()) {
-    const StatedCovariance noise = to_covariance(process_noise);
+    const StatedCovariance noise = to_covariance(process_noise, "process_noise");
     if (!noise.complete()) throw py::value_error("process_noise must be specified");
     timing.process_noise = noise.of_specified();
   }

@@ -57,6 +57,9 @@ def test_places_and_axes(place):
     assert back.latitude == pytest.approx(place[0], abs=1e-13) and back.altitude == pytest.approx(place[2], abs=1e-8)
     if abs(place[0]) < 90:
         assert back.longitude == pytest.approx(place[1], abs=1e-12)
+    for bad in ([np.nan, 0, 0], [np.inf, 0, 0]):
+        with pytest.raises(tfdude.InvalidArgumentException):
+            Geodetic.from_ecef(bad)
 
 
 def mercator(latitude, longitude, zone):

@@ -56,6 +56,7 @@ def test_errors_of_other_calls_name_what_their_text_names(client, node):
         (ValueError, "span must not be negative", lambda c: c.watch("base", "tool", span=-1)),
         (ValueError, "timeout must not be negative", lambda c: tfdude.Client(timeout=-1, network=NETWORK)),
         (ValueError, "max_age must not be negative", lambda c: tfdude.MessageFilter(c, "base", max_age=-1)),
+        (ValueError, "process_noise must have the shape", lambda c: FrameSpec("a", process_noise=[0.1] * 6)),
     ],
 )
 def test_wrong_arguments_name_themselves(client, kind, name, call):

@@ -1,7 +1,9 @@
 #include "tfdude/types/options.hpp"
 
+#include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <string>
 #include <string_view>
 
 namespace tfdude {
@@ -24,7 +26,11 @@ std::uint32_t domain_of_environment() {
 
 std::string profile_of_environment() { return std::string(environment("TFDUDE_PROFILE")); }
 
-bool shared_memory_of_environment() { return environment("TFDUDE_SHARED_MEMORY") != "off"; }
+bool shared_memory_of_environment() {
+  std::string text(environment("TFDUDE_SHARED_MEMORY"));
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text != "off" && text != "false" && text != "no" && text != "0";
+}
 
 std::string keys_of_environment() { return std::string(environment("TFDUDE_KEYS")); }
 

@@ -58,6 +58,12 @@ bool is_plain(const std::string& name) {
   return !has_blank(name) && name.find_first_of("\"<&$'") == std::string::npos;
 }
 
+// In a launch file: neither an option, nor what the shell or ROS would take for something else.
+bool is_launch_argument(const std::string& name) {
+  return is_plain(name) && name.front() != '/' && name.front() != '-' &&
+         name.find(":=") == std::string::npos && name.find('\\') == std::string::npos;
+}
+
 Result<const FrameSpec*> only(const Frames& frames, FrameFormat format) {
   if (frames.size() == 1) return &frames.front();
   return fail(Errc::kInvalidInput, std::string("a file of ") + to_string(format) +
@@ -119,7 +125,7 @@ Result<std::string> launch(const Frames& frames, bool second) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const FrameSpec& frame = frames[i];
     for (const std::string& name : {frame.id, frame.parent}) {
-      if (is_plain(name) && name.front() != '/' && name.find(":=") == std::string::npos) continue;
+      if (is_launch_argument(name)) continue;
       return refused(frame, "a launch file cannot have the name " + quote(name));
     }
     Eigen::Matrix<double, 7, 1> numbers;

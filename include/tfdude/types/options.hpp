@@ -27,7 +27,7 @@ inline constexpr std::uint32_t kNoDomain = UINT32_MAX;
 [[nodiscard]] TFDUDE_EXPORT std::string profile_of_environment();
 /// The directory of keys in the environment's TFDUDE_KEYS, else empty.
 [[nodiscard]] TFDUDE_EXPORT std::string keys_of_environment();
-/// False if the environment's TFDUDE_SHARED_MEMORY is "off".
+/// False if the environment's TFDUDE_SHARED_MEMORY is "off", "false", "no" or "0".
 [[nodiscard]] TFDUDE_EXPORT bool shared_memory_of_environment();
 
 /// How much others can make a Node keep. What would exceed it is rejected with kTooMuch, except

@@ -339,6 +339,12 @@ TEST_CASE("frame file: what could not be read again is not written") {
   for (const char* name : {"it's", "a&b", "$HOME"}) {
     CHECK(why({spec(name, "a")}, FrameFormat::kColmap) == "written");
   }
+  for (const char* name : {"a\\b", "-5", "--x"}) {
+    CHECK_THAT(why({spec(name, "a")}, FrameFormat::kRos1),
+               ContainsSubstring("cannot have the name"));
+    CHECK_THAT(why({spec("a", name)}, FrameFormat::kRos2),
+               ContainsSubstring("cannot have the name"));
+  }
   CHECK_THAT(why({spec("a b", "a")}, FrameFormat::kColmap), ContainsSubstring("with a space"));
 }
 
