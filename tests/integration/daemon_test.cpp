@@ -85,4 +85,20 @@ TEST_CASE("daemon: it prints how many frames it serves and may serve none") {
   CHECK_THAT(help.out, ContainsSubstring("Example: tfduded "));
 }
 
+TEST_CASE("daemon: a command that was started before it waits until it serves") {
+  const TestDomain domain;
+  using Arguments = std::vector<std::string>;
+  for (const Arguments& command :
+       {Arguments{"partitions"}, {"lookup", "world", "robot_1"}, {"frames"}, {"tree"}}) {
+    Arguments arguments{"--timeout", "20000"};
+    arguments.insert(arguments.end(), command.begin(), command.end());
+    testing::Process asking = domain.start_cli(arguments);
+    const testing::Process robot = domain.start_daemon({"--config", testing::kRobotFile});
+    const CliResult result = testing::finish(asking);
+    INFO(command.front() << ": " << result.err);
+    CHECK(result.status == 0);
+    CHECK_FALSE(result.out.empty());
+  }
+}
+
 }  // namespace tfdude

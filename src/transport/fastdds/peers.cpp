@@ -202,7 +202,7 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
 
 bool Peers::discovered() const {
   const Lock lock(mutex_);
-  if (servers_.empty() || !all_present()) return false;
+  if (servers_.empty() || !all_present() || is_about_to_be_served()) return false;
   const auto [most, least] = unknown_here();
   if (most > 0) return false;
   return Clock::now() - last_met_ >= (least == 0 ? kAgreedQuiet : kQuiet);
@@ -274,6 +274,15 @@ std::pair<long, long> Peers::unknown_here() const {
     least = std::min(least, more);
   }
   return {most, least};
+}
+
+bool Peers::is_about_to_be_served() const {
+  const auto any = [&](bool serving) {
+    return std::any_of(servers_.begin(), servers_.end(), [&](const auto& known) {
+      return !known.second.silent && known.second.presence->serving == serving;
+    });
+  };
+  return !is_server_ && any(false) && !any(true);
 }
 
 bool Peers::all_present() const {

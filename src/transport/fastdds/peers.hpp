@@ -131,7 +131,8 @@ class Peers {
   [[nodiscard]] bool may_be_replaced() const;
 
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
-  /// announced what they serve, and none hears more others than this participant knows.
+  /// announced what they serve, and none hears more others than this participant knows. For one
+  /// that serves nothing, some server must do more than claim a partition.
   [[nodiscard]] bool discovered() const;
 
   /// Whether some server was discovered that has not announced yet what it serves. A server that
@@ -169,6 +170,8 @@ class Peers {
   bool ask_rival(Server& server, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
   void note_doubts() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
+  /// Whether all that this client hears is who only claims a partition yet.
+  [[nodiscard]] bool is_about_to_be_served() const TFDUDE_REQUIRES(mutex_);
   /// The largest number of servers that one of them hears beyond those known here, and the
   /// smallest: negative if it hears fewer.
   [[nodiscard]] std::pair<long, long> unknown_here() const TFDUDE_REQUIRES(mutex_);

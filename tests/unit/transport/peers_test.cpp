@@ -238,6 +238,17 @@ TEST_CASE("discovery is complete when all peers know as many participants") {
     std::this_thread::sleep_for(Peers::kAgreedQuiet);
     CHECK_FALSE(one.peers.discovered());
     std::this_thread::sleep_for(Peers::kQuiet);
+    CHECK_FALSE(one.peers.discovered());  // it is about to serve, and nobody else does
+    one.peers.present(prefix_of(1), presence_of("arms"), 0);
+    CHECK(one.peers.discovered());
+  }
+  SECTION("a peer that claims its name beside one that serves") {
+    one.meet(1, "arms");
+    one.peers.met(peer_of(prefix_of(2)), serving("head"));
+    Presence claim = presence_of("head");
+    claim.serving = false;
+    one.peers.present(prefix_of(2), claim, 0);
+    std::this_thread::sleep_for(Peers::kQuiet);
     CHECK(one.peers.discovered());
   }
 }
@@ -247,6 +258,13 @@ TEST_CASE("servers count also the participant that asks") {
   server.meet(1, "arms", 1);
   std::this_thread::sleep_for(Peers::kAgreedQuiet);
   CHECK(server.peers.discovered());
+  Observer beside(true);
+  beside.peers.met(peer_of(prefix_of(1)), serving("arms"));
+  Presence claim = presence_of("arms");
+  claim.serving = false;
+  beside.peers.present(prefix_of(1), claim, 1);
+  std::this_thread::sleep_for(Peers::kQuiet);
+  CHECK(beside.peers.discovered());
 }
 
 TEST_CASE("a server that is not needed counts as lost without announcements") {
