@@ -197,12 +197,15 @@ def test_message_filter(network, car):
         given = [(i, "lidar", START + i * MS) for i in range(100)]
         assert len(list(tfdude.filter_messages(car, "odom", given, most=3, **options))) == 100
 
-    # Messages that can be had already are not counted as waiting, whether somebody gets them or not.
-    messages = tfdude.MessageFilter(car, "odom", most=2)
-    for i in range(6):
-        messages.push(i, "lidar", START + i * MS)
-        assert eventually(lambda: not messages._full())
-    assert [messages.get(timeout=20)[0] for _ in range(6)] == list(range(6))
+    # Messages that can be had already do not count as waiting. Of those that nobody gets, the last ones are kept.
+    told = []
+    for on_dropped in (None, lambda message, error: told.append((message, error.code))):
+        messages = tfdude.MessageFilter(car, "odom", most=2, on_dropped=on_dropped)
+        for i in range(6):
+            messages.push(i, "lidar", START + i * MS)
+            assert eventually(lambda: not messages._full())
+        assert [messages.get(timeout=20)[0] for _ in range(2)] == [4, 5]
+    assert told == [(2, "too_much"), (3, "too_much")]
 
     async def main():
         waiting = tfdude.MessageFilter(car, "odom", in_order=True)

@@ -36,9 +36,10 @@ class MessageFilter(Generic[Message]):
             ...
 
     target: the frame in which each message's frame is wanted. max_age [s]: how long a message waits. most: messages
-    that wait; one more drops the oldest. in_order: as pushed; otherwise each as soon as its transform can be had.
-    on_dropped(message, error): called by the thread that asks for messages, once for each that is dropped: its age
-    (the error says what was missing), the number ('too_much'), or data that is no longer kept.
+    that wait for their transform, and as many again for who asks; one more drops the oldest. in_order: as pushed;
+    otherwise each as soon as its transform can be had. on_dropped(message, error): called by the thread that asks for
+    messages, once for each that is dropped, but the last `most` of them only: its age (the error says what was
+    missing), the number ('too_much'), or data that is no longer kept.
 
     A loop ends when close() was called and nothing waits any more.
     """
@@ -67,6 +68,7 @@ class MessageFilter(Generic[Message]):
         self._waiting: collections.OrderedDict[int, _Waiting[Message]] = collections.OrderedDict()
         self._collecting = threading.Lock()
         self._ready: collections.deque[_Waiting[Message]] = collections.deque()
+        self._dropped: collections.deque[_Waiting[Message]] = collections.deque(maxlen=self._most)
         self._key = 0
         self._closed = False
 
@@ -96,8 +98,7 @@ class MessageFilter(Generic[Message]):
             if len(self._waiting) <= self._most:
                 return
             _, oldest = self._waiting.popitem(last=False)
-            oldest.answer = _errors.make("too_much", f"more than {self._most} messages wait")
-            self._done(oldest)
+            self._displaced(oldest)
         self._mailbox.wake()
 
     def __len__(self) -> int:
@@ -139,12 +140,21 @@ class MessageFilter(Generic[Message]):
                 await _until_readable(self._mailbox)
 
     def _over(self) -> bool:
-        return (self._closed or self._client.closed) and not self._waiting and not self._ready
+        return (self._closed or self._client.closed) and not (self._waiting or self._ready or self._dropped)
 
     def _done(self, entry: _Waiting[Message]) -> None:
         if entry.lookup is not None:
             entry.lookup.cancel()
-        self._ready.append(entry)
+        if isinstance(entry.answer, _core.StampedTransform):
+            self._ready.append(entry)
+            if len(self._ready) > self._most:
+                self._displaced(self._ready.popleft())
+        elif self._on_dropped is not None:
+            self._dropped.append(entry)
+
+    def _displaced(self, entry: _Waiting[Message]) -> None:
+        entry.answer = _errors.make("too_much", f"more than {self._most} messages wait")
+        self._done(entry)
 
     def _collect(self) -> None:
         """Takes what was answered. The threads that push and that get may both do so."""
@@ -164,14 +174,15 @@ class MessageFilter(Generic[Message]):
 
     def _next(self) -> tuple[Message, _core.StampedTransform] | None:
         self._collect()
-        while self._ready:
-            entry = self._ready.popleft()
-            if isinstance(entry.answer, _core.StampedTransform):
-                return entry.message, entry.answer
-            if self._on_dropped is not None:
-                assert isinstance(entry.answer, _errors.TransformException)
-                self._on_dropped(entry.message, entry.answer)
-        return None
+        while self._dropped:
+            entry = self._dropped.popleft()
+            assert isinstance(entry.answer, _errors.TransformException) and self._on_dropped is not None
+            self._on_dropped(entry.message, entry.answer)
+        if not self._ready:
+            return None
+        entry = self._ready.popleft()
+        assert isinstance(entry.answer, _core.StampedTransform)
+        return entry.message, entry.answer
 
 
 def filter_messages(

@@ -79,6 +79,21 @@ class EdgesTask final : public Task {
   std::vector<EdgeAtEnds> edges_;
 };
 
+// Whether B turns by more than half a turn from the first instant over another one to the last:
+// then the shorter way between the first and the last pose is not the way that it took.
+bool turns_too_far(const std::vector<EdgeAtEnds>& edges, const Pose& between) {
+  Pose first;
+  Pose last;
+  for (const EdgeAtEnds& edge : edges) {
+    const bool up = edge.way == ObservedEdge::Way::kUp;
+    first = first * (up ? edge.before.pose.inverse() : edge.before.pose);
+    last = last * (up ? edge.after.pose.inverse() : edge.after.pose);
+  }
+  const Eigen::Quaterniond& middle = between.rotation();
+  return first.rotation().angularDistance(middle) + middle.angularDistance(last.rotation()) >
+         EIGEN_PI;
+}
+
 }  // namespace
 
 Result<Velocities::Interval> Velocities::interval(const std::string& a, const std::string& b,
@@ -113,9 +128,12 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   }
   if (auto ok = check_stamp(query.at); !ok) return tl::unexpected(std::move(ok.error()));
   auto newest = lookup(a, b, {}, deadline);
-  // No edge has samples: what was not sampled yet is nowhere at an instant.
+  // No edge has samples: what was not sampled yet is nowhere at an instant, whichever, and nobody
+  // has measured how it moves.
   const bool rests = newest && !newest->stamp;
-  if (rests && query.at) newest = lookup(a, b, query.at, deadline);
+  if (rests && (query.at || newest->covariance.complete())) {
+    newest = lookup(a, b, query.at.value_or(Time{}), deadline);
+  }
   if (!newest) return tl::unexpected(std::move(newest.error()));
   if (rests) {
     Velocity rest;
@@ -129,6 +147,15 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   EdgesTask task(structure_.forest, a, b, ends.begin, ends.end);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
   const std::vector<EdgeAtEnds>& edges = task.edges();
+  const auto between = lookup(a, b, ends.begin + (ends.end - ends.begin) / 2, deadline);
+  if (!between) return tl::unexpected(between.error());
+  if (turns_too_far(edges, between->pose)) {
+    return fail_about_frame(Errc::kInvalidInput,
+                            "frame " + quote(b) + " turns by more than half a turn in " + quote(a) +
+                                " within " + readable(ends.end - ends.begin) +
+                                ", so that two poses do not tell how fast: ask over less time",
+                            b);
+  }
   MeanVelocity mean =
       mean_velocity(edges, std::chrono::duration<double>(ends.end - ends.begin).count());
   Velocity velocity{mean.linear, mean.angular, mean.covariance, ends.begin, ends.end, {}};

@@ -75,7 +75,7 @@ std::vector<std::string> unspecified_edges(const Ends& ends, std::int64_t t, Oth
     if (is_named(*here)) (from_a ? up : down).emplace_back(here->name->text);
     here = Frames::at(*here->above, ends.commit);
   }
-  // Whoever gets no name takes the covariance for complete.
+  // Others take the covariance for complete if they get no name.
   if (up.empty() && down.empty() && last != nullptr) up.emplace_back(last->name->text);
   up.insert(up.end(), std::make_move_iterator(down.rbegin()), std::make_move_iterator(down.rend()));
   return up;

@@ -276,9 +276,14 @@ TEST_CASE("memory: velocities and lookups of two instants are those over DDS, an
   // Of two owners, and one edge that is on both ways.
   const std::vector<std::string> moving{"robot_1", "arm_1", "hand_left"};
   REQUIRE(d.dds.correlate("robot_2", {false, {{"supply", false, random.loading(2, 0.003)}}, {}}));
+  // What turns by more than half a turn has no velocity.
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < moving.size(); ++i) poses.push_back(random.pose(1.0));
   for (int ms = 0; ms < 200; ms += 10) {
-    for (const std::string& id : moving) {
-      REQUIRE(d.dds.update(id, random.transform(1.0, 0.1, 0.01), at_ms(1000 + ms)));
+    for (std::size_t i = 0; i < moving.size(); ++i) {
+      poses[i] = poses[i] * tfdude::exp(random.twist(0.2, 0.1));
+      const Transform X{poses[i], random.covariance(0.1, 0.01)};
+      REQUIRE(d.dds.update(moving[i], X, at_ms(1000 + ms)));
     }
   }
   const auto asks = [&](Client& client, int i) {

@@ -384,9 +384,10 @@ class TFDUDE_EXPORT Client {
   /// most twice the variance of independent errors, and it is too large if the error changes
   /// slowly. The same holds for sources that dynamic edges share. Unspecified edges are named, and
   /// the covariance is that of the others. The velocity is a mean: how far it is from the velocity
-  /// at an instant is not part of the covariance. Two to four round trips for the path of others.
+  /// at an instant is not part of the covariance. Three to five round trips for the path of others.
   /// @return as lookup(); kInvalidInput (the interval is not positive; more than 128 edges; an edge
-  ///   has samples that came without a stamp, around the interval or after it: they tell none).
+  ///   has samples that came without a stamp, around the interval or after it: they tell none; b
+  ///   turns by more than half a turn on its way to the middle of the interval and on to its end).
   [[nodiscard]] Result<Velocity> velocity(const std::string& a, const std::string& b,
                                           const VelocityQuery& query = {}, Milliseconds wait = {});
 
