@@ -27,7 +27,7 @@ class DdsParticipant {
     // The handshake takes longer than the lease of the profile.
     qos.wire_protocol().builtin.discovery_config.leaseDuration = {30, 0};
     if (keys != nullptr) fastdds::Access(*keys).secure(qos);
-    // Otherwise an assertion of Fast DDS may end the process (SendFilter in compat.hpp).
+    // Otherwise an assertion of Fast DDS may end the process (send_filter.hpp).
     fastdds::DiscoveryGate gate(std::make_shared<fastdds::Gate>(),
                                 std::make_shared<fastdds::LifeSigns>());
     gate.prepare(qos, domain, false);

@@ -8,6 +8,7 @@
 
 #include "transport/fastdds/codec.hpp"
 #include "transport/fastdds/peers.hpp"
+#include "transport/fastdds/send_filter.hpp"
 #include "transport/fastdds/topics.hpp"
 
 namespace tfdude::testing {

@@ -49,6 +49,14 @@ class Datagram {
                  const Bytes& payload) {
     return begin(0x15, 0x05).u16(0).u16(16).raw(reader).raw(writer).sn(number).raw(payload).end();
   }
+  /// DATA without a payload that disposes of an endpoint of the sender, and unregisters it.
+  Datagram& dispose(const Entity& reader, const Entity& writer, std::uint64_t number,
+                    const Entity& endpoint) {
+    const Bytes sender(bytes_.begin() + 8, bytes_.begin() + 20);
+    begin(0x15, 0x03).u16(0).u16(16).raw(reader).raw(writer).sn(number);
+    u16(0x70).u16(16).raw(sender).raw(endpoint).u16(0x71).u16(4).raw(Bytes{0, 0, 0, 3});
+    return u16(1).u16(0).end();
+  }
   Datagram& fragment(const Entity& reader, const Entity& writer, std::uint64_t number,
                      std::uint32_t first, std::uint16_t many, std::uint16_t bytes,
                      std::uint32_t sample, std::size_t payload) {

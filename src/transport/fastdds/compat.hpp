@@ -1,6 +1,7 @@
 #pragma once
 
-// All that differs in the source between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13).
+// All that differs in the source between Fast DDS 2.9 (Debian 12) and 3.1 (Debian 13), but for how
+// datagrams are sent (send_filter.hpp).
 
 #if TFDUDE_FASTDDS_MAJOR == 2
 #include <tfdudePubSubTypes.h>
@@ -65,7 +66,6 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,6 +74,20 @@ namespace tfdude::fastdds {
 
 namespace edds = eprosima::fastdds::dds;
 namespace etransport = eprosima::fastdds::rtps;
+
+/// What decides about the matches of an endpoint, and where it is, as one number.
+template <class Locators>
+std::uint64_t number_of_settings(std::string topic, const std::vector<std::string>& partitions,
+                                 int reliability, int durability, const Locators& locators) {
+  std::string all = std::move(topic);
+  for (const std::string& partition : partitions) all.append(1, '\0').append(partition);
+  all.append(1, '\0').append(std::to_string(reliability)).append(std::to_string(durability));
+  for (const auto& at : locators) {
+    all.append(reinterpret_cast<const char*>(at.address), sizeof at.address);
+    all.append(std::to_string(at.port));
+  }
+  return std::hash<std::string>()(all);
+}
 
 #if TFDUDE_FASTDDS_MAJOR == 2
 
@@ -121,8 +135,9 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
 }
 
 /// Reports participants: met(guid prefix, name, user data), changed(the same, when that changes),
-/// left(guid prefix), authenticated(guid prefix, verified); and writers: writer_found(guid, DDS
-/// partitions), writer_lost(guid). A writer is reported before it is matched.
+/// left(guid prefix), authenticated(guid prefix, verified); writers: writer_found(guid, DDS
+/// partitions), writer_lost(guid); and all endpoints: endpoint_found(guid, number of its settings),
+/// also when they may have changed, endpoint_lost(guid). A writer is reported before it is matched.
 template <class Observer>
 class ParticipantListener final : public edds::DomainParticipantListener {
  public:
@@ -155,9 +170,31 @@ class ParticipantListener final : public edds::DomainParticipantListener {
     } else if (info.status == ertps::WriterDiscoveryInfo::REMOVED_WRITER) {
       observer_.writer_lost(info.info.guid());
     }
+    using Info = ertps::WriterDiscoveryInfo;
+    report(info.info, info.status == Info::DISCOVERED_WRITER, info.status == Info::REMOVED_WRITER,
+           info.status == Info::CHANGED_QOS_WRITER);
+  }
+
+  void on_subscriber_discovery(edds::DomainParticipant*,
+                               ertps::ReaderDiscoveryInfo&& info) override {
+    using Info = ertps::ReaderDiscoveryInfo;
+    report(info.info, info.status == Info::DISCOVERED_READER, info.status == Info::REMOVED_READER,
+           info.status == Info::CHANGED_QOS_READER);
   }
 
  private:
+  template <class Endpoint>
+  void report(const Endpoint& endpoint, bool is_new, bool is_gone, bool has_changed) {
+    if (is_gone) observer_.endpoint_lost(endpoint.guid());
+    if (!is_new && !has_changed) return;
+    const auto& qos = endpoint.m_qos;
+    observer_.endpoint_found(
+        endpoint.guid(),
+        number_of_settings(endpoint.topicName().to_string(), qos.m_partition.getNames(),
+                           qos.m_reliability.kind, qos.m_durability.kind,
+                           endpoint.remote_locators().unicast));
+  }
+
   Observer& observer_;
 };
 
@@ -262,9 +299,30 @@ class ParticipantListener final : public edds::DomainParticipantListener {
     } else if (reason == ertps::WriterDiscoveryStatus::REMOVED_WRITER) {
       observer_.writer_lost(info.guid);
     }
+    using Status = ertps::WriterDiscoveryStatus;
+    report(info, reason == Status::DISCOVERED_WRITER, reason == Status::REMOVED_WRITER,
+           reason == Status::CHANGED_QOS_WRITER);
+  }
+
+  void on_data_reader_discovery(edds::DomainParticipant*, ertps::ReaderDiscoveryStatus reason,
+                                const edds::SubscriptionBuiltinTopicData& info, bool&) override {
+    using Status = ertps::ReaderDiscoveryStatus;
+    report(info, reason == Status::DISCOVERED_READER, reason == Status::REMOVED_READER,
+           reason == Status::CHANGED_QOS_READER);
   }
 
  private:
+  template <class Endpoint>
+  void report(const Endpoint& endpoint, bool is_new, bool is_gone, bool has_changed) {
+    if (is_gone) observer_.endpoint_lost(endpoint.guid);
+    if (!is_new && !has_changed) return;
+    observer_.endpoint_found(
+        endpoint.guid,
+        number_of_settings(endpoint.topic_name.to_string(), endpoint.partition.getNames(),
+                           endpoint.reliability.kind, endpoint.durability.kind,
+                           endpoint.remote_locators.unicast));
+  }
+
   Observer& observer_;
 };
 
@@ -307,82 +365,5 @@ inline bool write(edds::DataWriter& writer, void* data) {
   ertps::WriteParams params;
   return write(writer, data, params);
 }
-
-/// A transport that sends through another one, only to allowed destinations, and sees the source of
-/// each datagram.
-class SendFilter : public etransport::ChainingTransport {
- public:
-  using ChainingTransport::ChainingTransport;
-
-  bool OpenOutputChannel(etransport::SendResourceList& resources,
-                         const ertps::Locator_t& to) override {
-    if (!ChainingTransport::OpenOutputChannel(resources, to)) return false;
-    opened_.insert(to);
-    return true;
-  }
-
-#if TFDUDE_FASTDDS_MAJOR == 2
-  bool send(ertps::SenderResource* through, const ertps::octet* bytes, std::uint32_t size,
-            ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& deadline) override {
-    const std::uint32_t needed = size_to_send(through, bytes, size);
-    return send_to(begin, end, [&](ertps::LocatorsIterator* from, ertps::LocatorsIterator* to) {
-      return through->send(bytes, needed, from, to, deadline);
-    });
-  }
-#else
-  bool send(ertps::SenderResource* through, const std::vector<ertps::NetworkBuffer>& buffers,
-            std::uint32_t size, ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end,
-            const std::chrono::steady_clock::time_point& deadline) override {
-    return send_to(begin, end, [&](ertps::LocatorsIterator* from, ertps::LocatorsIterator* to) {
-      return through->send(buffers, size, from, to, deadline);
-    });
-  }
-#endif
-
-  void receive(etransport::TransportReceiverInterface* next, const ertps::octet* bytes,
-               std::uint32_t size, const ertps::Locator_t& local,
-               const ertps::Locator_t& remote) override {
-    heard(remote);
-    next->OnDataReceived(bytes, size, local, remote);
-  }
-
- private:
-  /// How many bytes of a datagram to send. Not called by Fast DDS 3, which passes them in pieces.
-  virtual std::uint32_t size_to_send(ertps::SenderResource*, const ertps::octet*,
-                                     std::uint32_t size) {
-    return size;
-  }
-  [[nodiscard]] virtual bool may_send(const ertps::Locator_t& to) = 0;
-  virtual void heard(const ertps::Locator_t& from) const = 0;
-
-  // A datagram that may not be sent counts as sent, like one that is lost on the way.
-  template <class Send>
-  bool send_to(ertps::LocatorsIterator* begin, ertps::LocatorsIterator* end, Send send) {
-    thread_local std::vector<ertps::Locator_t> destinations;  // kept for its memory
-    destinations.clear();
-    for (auto& at = *begin; at != *end; ++at) {
-      if (may_send(*at) && is_open(*at)) destinations.push_back(*at);
-    }
-    if (destinations.empty()) return true;
-    etransport::Locators from(destinations.cbegin());
-    etransport::Locators to(destinations.cend());
-    return send(&from, &to);
-  }
-
-  // Fast DDS (2.9 and 3.1) opens the destinations of its announcements when it discovers a
-  // participant: the multicast address only, if several participants have it. When all but one have
-  // left, it sends to the unicast address of the last one. If nothing else has opened that, as with
-  // a participant that is not authenticated, an assertion in its statistics ends the process. The
-  // sockets exist already.
-  bool is_open(const ertps::Locator_t& to) {
-    if (opened_.count(to) != 0) return true;
-    etransport::SendResourceList none;
-    return OpenOutputChannel(none, to);
-  }
-
-  // Fast DDS opens and sends with a lock of the participant held.
-  std::set<ertps::Locator_t> opened_;
-};
 
 }  // namespace tfdude::fastdds

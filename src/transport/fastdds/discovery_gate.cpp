@@ -7,9 +7,13 @@
 #include <memory>
 #include <mutex>
 #include <utility>
+#include <vector>
 
+#include "base/log.hpp"
 #include "transport/fastdds/addresses.hpp"
 #include "transport/fastdds/outgoing.hpp"
+#include "transport/fastdds/rtps_layout.hpp"
+#include "transport/fastdds/send_filter.hpp"
 #include "transport/fastdds/send_throttle.hpp"
 
 namespace tfdude::fastdds {
@@ -40,6 +44,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
                   std::shared_ptr<Acknowledgements> acks,
                   std::shared_ptr<DatagramGuard> datagram_guard,
                   std::shared_ptr<FairShare> fair_share, std::shared_ptr<Farewells> of_others,
+                  std::shared_ptr<EndpointSets> endpoint_sets,
                   std::shared_ptr<DiscoveryGate::Channels> opened)
       : ChainingTransportDescriptor(std::move(guarded)),
         open(std::move(flag)),
@@ -52,6 +57,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
         guard(std::move(datagram_guard)),
         shares(std::move(fair_share)),
         farewells(std::move(of_others)),
+        endpoints(std::move(endpoint_sets)),
         channels(std::move(opened)) {}
 
   [[nodiscard]] etransport::TransportInterface* create_transport() const override;
@@ -75,6 +81,7 @@ struct GatedDescriptor final : etransport::ChainingTransportDescriptor {
   std::shared_ptr<DatagramGuard> guard;
   std::shared_ptr<FairShare> shares;
   std::shared_ptr<Farewells> farewells;
+  std::shared_ptr<EndpointSets> endpoints;  // null: not compared
   std::shared_ptr<DiscoveryGate::Channels> channels;
   std::shared_ptr<SendThrottle> throttle = std::make_shared<SendThrottle>();
 };
@@ -179,9 +186,11 @@ class GatedTransport final : public SendFilter {
       SendFilter::receive(next, bytes, static_cast<std::uint32_t>(size), local, remote);
     };
     if (!descriptor_.data_ports.contain(local.port)) {
-      for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
+      for (std::size_t i = 0; i < many; ++i) compare_endpoints(all[i], now);
+      // First, so that the announcement of one that did not leave discovers it anew.
       descriptor_.farewells->take(
           [&](const Farewells::Datagram& farewell) { take(farewell.data(), farewell.size()); });
+      for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
       return;
     }
     const FairShare::Sender sender = sender_at(remote);
@@ -191,11 +200,25 @@ class GatedTransport final : public SendFilter {
     descriptor_.shares->spent(sender, end - now, end);
   }
 
-  std::uint32_t size_to_send(ertps::SenderResource* through, const ertps::octet* bytes,
-                             std::uint32_t size) override {
-    announces_through_ = is_announcement(bytes, size) ? through : nullptr;
-    descriptor_.guard->send(bytes, size);
-    return size_without_statistics(bytes, size);
+  void compare_endpoints(const DatagramGuard::Bytes& datagram, FairShare::Clock::time_point now) {
+    if (descriptor_.endpoints == nullptr ||
+        !descriptor_.endpoints->contradicts(datagram.data, datagram.size, now)) {
+      return;
+    }
+    PeerId sender{};
+    std::copy_n(datagram.data + rtps::kPrefixAt, sender.size(), sender.begin());
+    descriptor_.farewells->say_for(sender);
+    log().warn(
+        "a participant has other endpoints than were announced in its name; it is discovered anew");
+  }
+
+  Datagram to_send(ertps::SenderResource* through, const Datagram& datagram) override {
+    announces_through_ = is_announcement(datagram.bytes, datagram.size) ? through : nullptr;
+    descriptor_.guard->send(datagram.bytes, datagram.size);
+    const Datagram needed{datagram.bytes, size_without_statistics(datagram.bytes, datagram.size)};
+    if (announces_through_ == nullptr || descriptor_.endpoints == nullptr) return needed;
+    announcement_ = descriptor_.endpoints->with_own(needed.bytes, needed.size);
+    return {announcement_.data(), static_cast<std::uint32_t>(announcement_.size())};
   }
 
   [[nodiscard]] bool may_send(const ertps::Locator_t& to) override {
@@ -217,6 +240,7 @@ class GatedTransport final : public SendFilter {
   // Used by one thread at a time: Fast DDS sends with a lock of the participant held.
   AnnouncementPace pace_;
   ertps::SenderResource* announces_through_ = nullptr;  // null: what is sent is something else
+  std::vector<std::uint8_t> announcement_;
 };
 
 etransport::TransportInterface* GatedDescriptor::create_transport() const {
@@ -309,9 +333,9 @@ void DiscoveryGate::prepare(edds::DomainParticipantQos& qos, std::uint32_t domai
   if (client && only_udp(qos)) hear_by_unicast_only(qos, domain);
   for (auto& transport : qos.transport().user_transports) {
     if (!is_udp(transport)) continue;
-    transport = std::make_shared<GatedDescriptor>(transport, open_, client, data_ports, discovering,
-                                                  gate_, life_signs_, acknowledgements_, guard_,
-                                                  shares_, farewells_, channels_);
+    transport = std::make_shared<GatedDescriptor>(
+        transport, open_, client, data_ports, discovering, gate_, life_signs_, acknowledgements_,
+        guard_, shares_, farewells_, discovering == nullptr ? endpoints_ : nullptr, channels_);
   }
 }
 

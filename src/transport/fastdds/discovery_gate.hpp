@@ -10,6 +10,7 @@
 #include "transport/fastdds/acknowledgements.hpp"
 #include "transport/fastdds/compat.hpp"
 #include "transport/fastdds/datagram_guard.hpp"
+#include "transport/fastdds/endpoint_sets.hpp"
 #include "transport/fastdds/fair_share.hpp"
 #include "transport/fastdds/farewells.hpp"
 #include "transport/fastdds/gate.hpp"
@@ -46,18 +47,21 @@ class DiscoveryGate {
   /// @param guard  decides which of them Fast DDS has
   /// @param shares  and whether those with data would take too much of its time
   /// @param farewells  are given to Fast DDS as if they had been received
+  /// @param endpoints  announced with this participant, and compared with what others announce
   DiscoveryGate(
       std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
       std::shared_ptr<Acknowledgements> acknowledgements = std::make_shared<Acknowledgements>(),
       std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false),
       std::shared_ptr<FairShare> shares = std::make_shared<FairShare>(),
-      std::shared_ptr<Farewells> farewells = std::make_shared<Farewells>())
+      std::shared_ptr<Farewells> farewells = std::make_shared<Farewells>(),
+      std::shared_ptr<EndpointSets> endpoints = std::make_shared<EndpointSets>())
       : gate_(std::move(gate)),
         life_signs_(std::move(life_signs)),
         acknowledgements_(std::move(acknowledgements)),
         guard_(std::move(guard)),
         shares_(std::move(shares)),
-        farewells_(std::move(farewells)) {}
+        farewells_(std::move(farewells)),
+        endpoints_(std::move(endpoints)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -93,6 +97,7 @@ class DiscoveryGate {
   const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<FairShare> shares_;
   const std::shared_ptr<Farewells> farewells_;
+  const std::shared_ptr<EndpointSets> endpoints_;
   const std::shared_ptr<Channels> channels_ = std::make_shared<Channels>();
   bool counts_channels_ = false;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);

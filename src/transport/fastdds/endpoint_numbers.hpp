@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 
 #include "base/mutex.hpp"
+#include "transport/fastdds/endpoint_sets.hpp"
 
 namespace tfdude::fastdds {
 
@@ -61,6 +63,7 @@ class EndpointNumbers {
 struct Announced {
   EndpointNumbers writers;
   EndpointNumbers readers;
+  std::shared_ptr<EndpointSets> all = std::make_shared<EndpointSets>();
 };
 
 }  // namespace tfdude::fastdds

@@ -59,10 +59,12 @@ Writer::Writer(const Context& context, edds::Topic& topic, const std::string& pa
   if (!check_) return;
   ++context_.counters.writers;
   number_ = context.announced.writers.created([this] { announce_again(*writer_); });
+  context.announced.all->created(entity_of(writer_->guid()));
 }
 
 Writer::~Writer() {
   context_.announced.writers.deleted(number_);
+  if (writer_ != nullptr) context_.announced.all->deleted(entity_of(writer_->guid()));
   const Gate::Pause pause(context_.gate);
   const Lock lock(endpoints_change());
   if (writer_ != nullptr && ok(publisher_->delete_datawriter(writer_))) --context_.counters.writers;

@@ -53,6 +53,13 @@ void announce_again(Endpoint& endpoint) {
   if (!ok(endpoint.set_qos(qos))) log_not_announced();
 }
 
+/// The part of an endpoint's GUID that is its own.
+[[nodiscard]] inline EndpointSets::Entity entity_of(const ertps::GUID_t& endpoint) {
+  EndpointSets::Entity entity{};
+  std::copy_n(endpoint.entityId.value, entity.size(), entity.begin());
+  return entity;
+}
+
 /// Why a writer and a reader of a topic do not match: the setting, and what each side has.
 [[nodiscard]] std::string mismatch_of(const std::string& topic, edds::QosPolicyId_t policy);
 /// Once for each.
@@ -190,6 +197,7 @@ class Reader : public edds::DataReaderListener {
                  .map([&](edds::DataReader* reader) { reader_ = reader; });
     if (!check_) return;
     number_ = context.announced.readers.created([this] { announce_again(*reader_); });
+    context.announced.all->created(entity_of(reader_->guid()));
   }
 
   ~Reader() override { close(); }
@@ -201,6 +209,7 @@ class Reader : public edds::DataReaderListener {
 
   void close() {
     context_.announced.readers.deleted(std::exchange(number_, EndpointNumbers::kNone));
+    if (reader_ != nullptr) context_.announced.all->deleted(entity_of(reader_->guid()));
     const Gate::Pause pause(context_.gate);
     const Lock lock(endpoints_change());
     if (reader_ != nullptr) subscriber_->delete_datareader(reader_);

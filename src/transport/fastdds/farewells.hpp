@@ -12,8 +12,9 @@ namespace tfdude::fastdds {
 
 /// Says to Fast DDS, in place of participants that were killed, that they leave. Fast DDS keeps
 /// such a participant for 30 s, and waits for its acknowledgements. Only for those that a later
-/// process has replaced, or that are silent (Departures, Crowd): a participant that is still alive
-/// would be discovered again, but only one of the two would know of it.
+/// process has replaced, or that are silent (Departures, Crowd), or that Fast DDS shall discover
+/// anew (EndpointSets): a participant that is alive is discovered again, but only one of the two
+/// knows of it.
 /// @par Thread safety  All functions are thread-safe.
 class Farewells {
  public:

@@ -330,6 +330,7 @@ void FastDdsTransport::reply(const PeerId& to, wire::Reply& sample) {
 
 void FastDdsTransport::met(const ertps::GuidPrefix_t& prefix, const std::string& name,
                            const std::vector<std::uint8_t>& user_data) {
+  announced_.all->found(peer_of(prefix));
   admission_.discovered(peer_of(prefix), read_announcement(name, user_data));
 }
 
@@ -356,6 +357,7 @@ void FastDdsTransport::admit(const PeerId& peer, const Announcement& said) {
 // A callback may still hold the writer. The worker then waits for it, so that the worker deletes
 // it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
+  if (announced_.all->left(peer_of(prefix))) return;
   admission_.left(peer_of(prefix));
   peers_.left(prefix);
   attention_.raise();

@@ -103,6 +103,12 @@ class FastDdsTransport final : public Transport {
     writer_partitions_.found(writer, partitions);
   }
   void writer_lost(const ertps::GUID_t& writer) { writer_partitions_.lost(writer); }
+  void endpoint_found(const ertps::GUID_t& endpoint, std::uint64_t settings) {
+    announced_.all->found(peer_of(endpoint.guidPrefix), entity_of(endpoint), settings);
+  }
+  void endpoint_lost(const ertps::GUID_t& endpoint) {
+    announced_.all->lost(peer_of(endpoint.guidPrefix), entity_of(endpoint));
+  }
 
  private:
   Result<void> create_participant();
@@ -140,8 +146,9 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<DatagramGuard> guard_;
   const std::shared_ptr<FairShare> fair_share_ = std::make_shared<FairShare>();
   const std::shared_ptr<Farewells> farewells_ = std::make_shared<Farewells>();
-  DiscoveryGate discovery_gate_{gate_,  life_signs_, acknowledgements_,
-                                guard_, fair_share_, farewells_};
+  Announced announced_;
+  DiscoveryGate discovery_gate_{gate_,       life_signs_, acknowledgements_, guard_,
+                                fair_share_, farewells_,  announced_.all};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);
@@ -157,7 +164,6 @@ class FastDdsTransport final : public Transport {
   WriterPartitions writer_partitions_;
   ReplyPaths reply_paths_;
   Attention attention_;
-  Announced announced_;
   bool announced_by_dds_ = true;  // participants hear the announcements of DDS; set at the start
   std::optional<Senders> senders_;
   std::optional<Contact> contact_;
