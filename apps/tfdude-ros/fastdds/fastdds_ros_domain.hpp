@@ -22,8 +22,11 @@ class Bridges {
   void changed(const Prefix&, const std::string&, const std::vector<std::uint8_t>&) {}
   void left(const Prefix& prefix);
   void authenticated(const Prefix&, bool) {}
-  void writer_found(const fastdds::ertps::GUID_t&, const std::vector<std::string>&) {}
+  void writer_found(const fastdds::ertps::GUID_t&, const std::string&,
+                    const std::vector<std::string>&) {}
   void writer_lost(const fastdds::ertps::GUID_t&) {}
+  void endpoint_found(const fastdds::ertps::GUID_t&, std::uint64_t) {}
+  void endpoint_lost(const fastdds::ertps::GUID_t&) {}
 
   /// None if the participant is no bridge.
   [[nodiscard]] std::optional<BridgeMark> find(const Prefix& prefix) const;

@@ -135,7 +135,7 @@ inline void discover_by_server(ertps::DiscoverySettings& discovery, const ertps:
 }
 
 /// Reports participants: met(guid prefix, name, user data), changed(the same, when that changes),
-/// left(guid prefix), authenticated(guid prefix, verified); writers: writer_found(guid, DDS
+/// left(guid prefix), authenticated(guid prefix, verified); writers: writer_found(guid, topic, DDS
 /// partitions), writer_lost(guid); and all endpoints: endpoint_found(guid, number of its settings),
 /// also when they may have changed, endpoint_lost(guid). A writer is reported before it is matched.
 template <class Observer>
@@ -166,7 +166,8 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   void on_publisher_discovery(edds::DomainParticipant*,
                               ertps::WriterDiscoveryInfo&& info) override {
     if (info.status == ertps::WriterDiscoveryInfo::DISCOVERED_WRITER) {
-      observer_.writer_found(info.info.guid(), info.info.m_qos.m_partition.getNames());
+      observer_.writer_found(info.info.guid(), info.info.topicName().to_string(),
+                             info.info.m_qos.m_partition.getNames());
     } else if (info.status == ertps::WriterDiscoveryInfo::REMOVED_WRITER) {
       observer_.writer_lost(info.info.guid());
     }
@@ -295,7 +296,7 @@ class ParticipantListener final : public edds::DomainParticipantListener {
   void on_data_writer_discovery(edds::DomainParticipant*, ertps::WriterDiscoveryStatus reason,
                                 const edds::PublicationBuiltinTopicData& info, bool&) override {
     if (reason == ertps::WriterDiscoveryStatus::DISCOVERED_WRITER) {
-      observer_.writer_found(info.guid, info.partition.getNames());
+      observer_.writer_found(info.guid, info.topic_name.to_string(), info.partition.getNames());
     } else if (reason == ertps::WriterDiscoveryStatus::REMOVED_WRITER) {
       observer_.writer_lost(info.guid);
     }

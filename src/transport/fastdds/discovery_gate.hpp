@@ -15,6 +15,7 @@
 #include "transport/fastdds/farewells.hpp"
 #include "transport/fastdds/gate.hpp"
 #include "transport/fastdds/life_signs.hpp"
+#include "transport/fastdds/sample_windows.hpp"
 
 namespace tfdude::fastdds {
 
@@ -47,6 +48,7 @@ class DiscoveryGate {
   /// @param guard  decides which of them Fast DDS has
   /// @param shares  and whether those with data would take too much of its time
   /// @param farewells  are given to Fast DDS as if they had been received
+  /// @param windows  decide which samples Fast DDS keeps until earlier ones come
   /// @param endpoints  announced with this participant, and compared with what others announce
   DiscoveryGate(
       std::shared_ptr<Gate> gate, std::shared_ptr<LifeSigns> life_signs,
@@ -54,14 +56,16 @@ class DiscoveryGate {
       std::shared_ptr<DatagramGuard> guard = std::make_shared<DatagramGuard>(false),
       std::shared_ptr<FairShare> shares = std::make_shared<FairShare>(),
       std::shared_ptr<Farewells> farewells = std::make_shared<Farewells>(),
-      std::shared_ptr<EndpointSets> endpoints = std::make_shared<EndpointSets>())
+      std::shared_ptr<EndpointSets> endpoints = std::make_shared<EndpointSets>(),
+      std::shared_ptr<SampleWindows> windows = std::make_shared<SampleWindows>())
       : gate_(std::move(gate)),
         life_signs_(std::move(life_signs)),
         acknowledgements_(std::move(acknowledgements)),
         guard_(std::move(guard)),
         shares_(std::move(shares)),
         farewells_(std::move(farewells)),
-        endpoints_(std::move(endpoints)) {}
+        endpoints_(std::move(endpoints)),
+        windows_(std::move(windows)) {}
 
   /// Prepares the creation of a participant. Changes neither transports other than UDP, nor
   /// discovery settings that the profile overrides.
@@ -98,6 +102,7 @@ class DiscoveryGate {
   const std::shared_ptr<FairShare> shares_;
   const std::shared_ptr<Farewells> farewells_;
   const std::shared_ptr<EndpointSets> endpoints_;
+  const std::shared_ptr<SampleWindows> windows_;
   const std::shared_ptr<Channels> channels_ = std::make_shared<Channels>();
   bool counts_channels_ = false;
   const std::shared_ptr<std::atomic<bool>> open_ = std::make_shared<std::atomic<bool>>(false);

@@ -20,20 +20,24 @@ constexpr std::chrono::milliseconds kRecountEvery{1};
 struct Load {
   FairShare::Clock::time_point busy_since;
   FairShare::Clock::time_point free_since;
+  long waits = -1;           // until then; -1: none has been handled
   bool has_message = false;  // the datagram at hand
 };
 thread_local Load load;
 
 }  // namespace
 
-void FairShare::begin(Clock::time_point now) {
-  if (now - load.free_since > kGap) load.busy_since = now;
+void FairShare::begin(Clock::time_point now, long waits) {
+  if (now - load.free_since > kGap && waits != load.waits) load.busy_since = now;
   load.has_message = false;
 }
 
 void FairShare::has_message() { load.has_message = true; }
 
-void FairShare::end(Clock::time_point now) { load.free_since = now; }
+void FairShare::end(Clock::time_point now, long waits) {
+  load.free_since = now;
+  load.waits = waits;
+}
 
 double FairShare::owed(const Account& account, Clock::time_point now) const {
   const double passed = std::chrono::duration<double>(now - account.at).count();
@@ -88,7 +92,9 @@ bool FairShare::admits(Sender sender, Clock::time_point now) {
     if (now - counted_ > kRecountEvery || now < counted_) count(now);
     const double taken = owed(known->second, now);
     const int heavy = std::max(1, heavy_ + (taken > kLight * kMemorySeconds ? 0 : 1));
-    if (active_ <= 1 || taken <= kShare / heavy * kMemorySeconds) return true;
+    const bool listens = (now - load.busy_since) % kListenEvery >= kListenEvery - kListenFor;
+    const bool limited = active_ > 1 || listens;
+    if (!limited || taken <= kShare / heavy * kMemorySeconds) return true;
   }
   return drop();
 }

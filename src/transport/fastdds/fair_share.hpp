@@ -27,7 +27,7 @@ class FairShare {
   /// The address from which a datagram came. What it says of its sender may be forged.
   using Sender = std::uint64_t;
 
-  /// A thread that continues within this time had messages waiting.
+  /// A thread that continues within this time, or has not waited, had messages waiting.
   static constexpr std::chrono::microseconds kGap{15};
   /// Overloaded is who has had messages waiting for this long.
   static constexpr std::chrono::microseconds kOverloadedAfter{500};
@@ -46,6 +46,11 @@ class FairShare {
   static constexpr double kShare = 0.5;
   /// A sender is active for this time after a datagram. A lone sender has no limit.
   static constexpr std::chrono::seconds kActive{2};
+  /// But in each kListenEvery of a thread that always has messages waiting, it is dropped for
+  /// kListenFor. So the queue is emptied, and others who send are noticed: while it is full, what
+  /// they send is lost.
+  static constexpr std::chrono::milliseconds kListenEvery{200};
+  static constexpr std::chrono::milliseconds kListenFor{5};
   /// Of so many senders the time is known; the one that was silent for longest is dropped.
   static constexpr std::size_t kMost = 256;
   /// The allowance of a sender for datagrams without a message, and its growth in a second [s].
@@ -53,8 +58,10 @@ class FairShare {
   static constexpr double kAllowanceGrowth = 0.1;
 
   /// The calling thread begins or has ended handling a datagram.
-  static void begin(Clock::time_point now);
-  static void end(Clock::time_point now);
+  /// @param waits  how often it has waited until now; a thread whose processor was taken away in
+  ///   between has not
+  static void begin(Clock::time_point now, long waits);
+  static void end(Clock::time_point now, long waits);
   /// The datagram at hand has a request or a streamed value. Other datagrams are what participants
   /// send by themselves, for example the structure to one that comes late: they count only beyond
   /// an allowance.

@@ -342,6 +342,13 @@ void FastDdsTransport::changed(const ertps::GuidPrefix_t& prefix, const std::str
   if (said.compatible()) admission_.discovered(peer_of(prefix), said);
 }
 
+void FastDdsTransport::writer_found(const ertps::GUID_t& writer, const std::string& topic,
+                                    const std::vector<std::string>& partitions) {
+  writer_partitions_.found(writer, partitions);
+  if (topic != kDirectoryTopic && topic != kPresenceTopic) return;
+  windows_->follow(peer_of(writer.guidPrefix), entity_of(writer));
+}
+
 void FastDdsTransport::authenticated(const ertps::GuidPrefix_t& prefix, bool verified) {
   if (verified) guard_->verified(peer_of(prefix));
   admission_.authenticated(peer_of(prefix), verified);

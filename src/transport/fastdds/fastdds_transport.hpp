@@ -99,10 +99,12 @@ class FastDdsTransport final : public Transport {
                const std::vector<std::uint8_t>& user_data);
   void left(const ertps::GuidPrefix_t& prefix);
   void authenticated(const ertps::GuidPrefix_t& prefix, bool verified);
-  void writer_found(const ertps::GUID_t& writer, const std::vector<std::string>& partitions) {
-    writer_partitions_.found(writer, partitions);
+  void writer_found(const ertps::GUID_t& writer, const std::string& topic,
+                    const std::vector<std::string>& partitions);
+  void writer_lost(const ertps::GUID_t& writer) {
+    writer_partitions_.lost(writer);
+    windows_->forget(peer_of(writer.guidPrefix), entity_of(writer));
   }
-  void writer_lost(const ertps::GUID_t& writer) { writer_partitions_.lost(writer); }
   void endpoint_found(const ertps::GUID_t& endpoint, std::uint64_t settings) {
     announced_.all->found(peer_of(endpoint.guidPrefix), entity_of(endpoint), settings);
   }
@@ -147,8 +149,9 @@ class FastDdsTransport final : public Transport {
   const std::shared_ptr<FairShare> fair_share_ = std::make_shared<FairShare>();
   const std::shared_ptr<Farewells> farewells_ = std::make_shared<Farewells>();
   Announced announced_;
+  const std::shared_ptr<SampleWindows> windows_ = std::make_shared<SampleWindows>();
   DiscoveryGate discovery_gate_{gate_,       life_signs_, acknowledgements_, guard_,
-                                fair_share_, farewells_,  announced_.all};
+                                fair_share_, farewells_,  announced_.all,    windows_};
   Peers peers_{life_signs_, [this](const Presence& presence) { handler_->on_presence(presence); },
                [this](const Presence& presence, std::chrono::nanoseconds early) {
                  handler_->on_lost(presence.partition, presence.incarnation, early);

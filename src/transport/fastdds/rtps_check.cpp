@@ -184,15 +184,30 @@ class Check {
 
   // Of a datagram that is made here.
   void run_heartbeats(const std::uint8_t* datagram, std::size_t size) {
+    for_each(datagram, size, [this](Submessage& next) {
+      if (next.id == rtps::kHeartbeat) (void)heartbeat(next);
+    });
+  }
+  void run_acknowledgements(const std::uint8_t* datagram, std::size_t size) {
+    for_each(datagram, size, [this](Submessage& next) {
+      if (next.id == rtps::kAckNack) (void)acknowledgement(next);
+      const std::uint8_t* const to =
+          next.id == rtps::kInfoDestination ? next.body.skip(sender_.size()) : nullptr;
+      if (to != nullptr) std::copy_n(to, sender_.size(), sender_.begin());
+    });
+  }
+
+ private:
+  template <class Take>
+  static void for_each(const std::uint8_t* datagram, std::size_t size, const Take& take) {
     std::size_t length = rtps::kHeader;
     for (std::size_t at = 0; length > 0 && (at += length) < size;) {
       Submessage next;
       length = begin(datagram + at, size - at, next);
-      if (length > 0 && next.id == rtps::kHeartbeat) (void)heartbeat(next);
+      if (length > 0) take(next);
     }
   }
 
- private:
   // @return its length with header and padding; 0: it does not fit
   static std::size_t begin(const std::uint8_t* from, std::size_t left, Submessage& submessage) {
     constexpr std::size_t kOwnHeader = 4;
@@ -526,6 +541,11 @@ std::vector<std::uint8_t> take_fragments(const std::uint8_t* datagram, std::size
 
 void for_each_heartbeat(const std::uint8_t* datagram, std::size_t size, NumberClaims& claims) {
   Check(false, claims).run_heartbeats(datagram, size);
+}
+
+void for_each_acknowledgement(const std::uint8_t* datagram, std::size_t size,
+                              NumberClaims& claims) {
+  Check(false, claims).run_acknowledgements(datagram, size);
 }
 
 DatagramFlaw check_datagram(const std::uint8_t* datagram, std::size_t size, bool secured,

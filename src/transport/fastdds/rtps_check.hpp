@@ -96,4 +96,8 @@ class FragmentTaker {
 /// Passes on what the heartbeats of an own datagram claim. Its sender counts for nothing.
 void for_each_heartbeat(const std::uint8_t* datagram, std::size_t size, NumberClaims& claims);
 
+/// Passes on what an own datagram acknowledges. The sender in a claim is the participant of the
+/// writer, to whom it is sent.
+void for_each_acknowledgement(const std::uint8_t* datagram, std::size_t size, NumberClaims& claims);
+
 }  // namespace tfdude::fastdds

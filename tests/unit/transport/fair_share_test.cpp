@@ -19,12 +19,16 @@ struct Thread {
   // Later than in other tests: the load is of the thread of the test.
   FairShare::Clock::time_point now = last += std::chrono::hours(1);
   static inline FairShare::Clock::time_point last{};
+  static inline long waits = 0;
+  FairShare::Clock::time_point ended{};
+  bool preempted = false;  // in each gap, instead of waiting
   FairShare shares;
 
   bool handle(FairShare::Sender sender, std::chrono::microseconds time,
               std::chrono::microseconds gap, bool has_message = true) {
     now += gap;
-    FairShare::begin(now);
+    if (now - ended > FairShare::kGap && !preempted) ++waits;
+    FairShare::begin(now, waits);
     const bool admitted = shares.admits(sender, now);
     if (admitted) {
       if (has_message) FairShare::has_message();
@@ -33,7 +37,7 @@ struct Thread {
     } else {
       now += 2us;
     }
-    FairShare::end(now);
+    FairShare::end(ended = now, waits);
     return admitted;
   }
 };
@@ -58,10 +62,28 @@ TEST_CASE("fair share: a flood gets half of the time, and others are never dropp
   CHECK(thread.shares.dropped() > 0);
 }
 
-TEST_CASE("fair share: a lone sender may use all of a thread") {
+TEST_CASE("fair share: a lone sender may use nearly all of a thread") {
   Thread thread;
-  for (int i = 0; i < 20'000; ++i) CHECK(thread.handle(kFlood, 20us, 1us));
-  CHECK(thread.shares.dropped() == 0);
+  const auto start = thread.now;
+  auto spent = 0us;
+  for (int i = 0; i < 100'000; ++i) {
+    if (thread.handle(kFlood, 20us, 1us)) spent += 20us;
+  }
+  CHECK(std::chrono::duration<double>(spent) / (thread.now - start) > 0.9);
+  // In between, those are noticed whose datagrams found no room in the queue.
+  CHECK(thread.shares.dropped() > 1000);
+}
+
+TEST_CASE("fair share: a thread whose processor others take is as busy as before") {
+  Thread thread;
+  (void)thread.handle(kOther, 20us, 1us);
+  thread.preempted = true;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto gap = i % 10 == 0 ? 100us : 1us;
+    (void)thread.handle(kFlood, 20us, gap);
+    if (i % 100 == 0) CHECK(thread.handle(kOther, 20us, gap));
+  }
+  CHECK(thread.shares.dropped() > 0);
 }
 
 TEST_CASE("fair share: what is no message has an allowance") {
