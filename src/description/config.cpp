@@ -26,8 +26,8 @@ constexpr std::array<std::string_view, 6> kFileKeys = {"partition", "clock",  "c
 constexpr std::array<std::string_view, 13> kFrameKeys = {
     "id",     "parent", "xyz",        "rpy",     "quat",        "matrix", "geodetic",
     "stddev", "cov",    "covariance", "history", "correlation", "sources"};
-constexpr std::array<std::string_view, 7> kHistoryKeys = {
-    "span", "count", "process_noise", "drifts", "moving", "max_ahead", "restart_after"};
+constexpr std::array<std::string_view, 8> kHistoryKeys = {
+    "span", "count", "process_noise", "drifts", "moving", "max_ahead", "restart_after", "believed"};
 
 // Reads the configuration file of a daemon.
 class ConfigReader : public YamlFields {
@@ -79,11 +79,13 @@ Result<EdgeTiming> ConfigReader::history(const Field& field, const std::string& 
   std::optional<double> span;
   std::optional<double> count;
   std::optional<double> restart;
+  std::optional<double> believed;
   std::optional<std::array<double, 6>> noise;
   const auto read = number(*entries, "span", what, span)
                         .and_then([&] { return number(*entries, "count", what, count); })
                         .and_then([&] { return max_ahead(*entries, what, timing.max_ahead); })
                         .and_then([&] { return number(*entries, "restart_after", what, restart); })
+                        .and_then([&] { return number(*entries, "believed", what, believed); })
                         .and_then([&] { return numbers(*entries, "process_noise", what, noise); })
                         .and_then([&] { return flag(*entries, "drifts", what, timing.drifts); })
                         .and_then([&] { return flag(*entries, "moving", what, timing.moving); });
@@ -102,6 +104,10 @@ Result<EdgeTiming> ConfigReader::history(const Field& field, const std::string& 
   if (restart && !(*restart >= 0 && *restart <= kMost && *restart == std::floor(*restart))) {
     return refuse("restart_after", " must be a whole number from 0 to 16777216");
   }
+  if (believed && !(*believed >= 0 && *believed <= kLongest)) {
+    return refuse("believed", " must be 0 to 1e6 seconds");
+  }
+  if (believed) timing.believed = std::chrono::nanoseconds(std::llround(*believed * 1e9));
   if (restart) timing.restart_after = static_cast<std::size_t>(*restart);
   if (span) timing.span = std::chrono::nanoseconds(std::llround(*span * 1e9));
   if (count) timing.count = static_cast<std::size_t>(*count);

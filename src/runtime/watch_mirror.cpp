@@ -60,6 +60,7 @@ WatchMirror::WatchMirror(const std::string& a, const std::string& b, WatchRoute 
   // The owner judges a source's clock.
   EdgeTiming told = timing;
   told.restart_after = 0;
+  told.believed = std::chrono::nanoseconds(0);
   told.max_ahead = std::chrono::nanoseconds::max();
   (void)forest_.set_default_timing(told);
   constexpr auto kAllow = Forest::MissingParent::kAllow;

@@ -168,7 +168,10 @@ Result<void> Forest::Impl::check_handed(const HandedEdge& edge) const {
 // than that of the last one.
 SampleHistory* Forest::Impl::adopted_history(const HandedEdge& edge, std::uint64_t commit) {
   if (!edge.timing) return nullptr;
-  SampleHistory* samples = SampleHistory::create(*arena_, *edge.timing).release();
+  // What is remembered is not handed over, nor for how long.
+  EdgeTiming timing = *edge.timing;
+  timing.believed = default_timing_.believed;
+  SampleHistory* samples = SampleHistory::create(*arena_, timing).release();
   for (const HandedSample& told : edge.samples) {
     if (samples->full()) {
       // No reader has seen it.

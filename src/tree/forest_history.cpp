@@ -23,6 +23,10 @@ Result<void> check_timing(const EdgeTiming& timing) {
                                          std::to_string(kMaxCount) + ", not " +
                                          std::to_string(timing.count));
   }
+  if (timing.believed < std::chrono::nanoseconds(0)) {
+    return fail(Errc::kInvalidInput,
+                "history believed must not be negative, as " + readable(timing.believed) + " is");
+  }
   return {};
 }
 
@@ -89,7 +93,7 @@ void Forest::Impl::insert_sample(const HeldVersion& newest, const GivenValue& va
   fresh.samples = samples;
   fresh.number = samples->next() - 1;
   if (newest.samples->has_instants(place)) begin_again(fresh);
-  drop_samples(*samples, newest.stamp);
+  drop_samples(fresh);
 }
 
 void Forest::Impl::give_back(SampleHistory* samples) {
@@ -104,6 +108,7 @@ void Forest::Impl::forget_history(HeldVersion& fresh) {
   if (before == nullptr) return;
   fresh.samples = SampleHistory::create(*arena_, before->timing()).release();
   fresh.stamp = kAlways;
+  bury(fresh.slot, *before, {before->oldest(), before->next()});
   give_back(before);
 }
 
@@ -189,6 +194,8 @@ Result<void> Forest::set_timing(std::string_view id, const EdgeTiming& timing) {
   } else if (timing.moving) {
     impl_->await_sample(fresh);
   }
+  impl_->remember(timing);
+  if (impl_->past_ != nullptr) impl_->past_->forget_before(*slot);
   impl_->commit();
   return {};
 }
@@ -197,6 +204,8 @@ Result<void> Forest::set_default_timing(const EdgeTiming& timing) {
   if (auto ok = check_timing(timing); !ok) return ok;
   const Writing lock(impl_->mutex_);
   impl_->default_timing_ = timing;
+  impl_->remember(timing);
+  if (impl_->past_ != nullptr) impl_->past_->keep_others(timing.believed.count() > 0);
   return {};
 }
 

@@ -4,9 +4,11 @@
 
 #include "tree/epoch.hpp"
 #include "tree/forest.hpp"
+#include "tree/former_edges.hpp"
 #include "tree/frames.hpp"
 #include "tree/graph.hpp"
 #include "tree/oldest_samples.hpp"
+#include "tree/past.hpp"
 #include "tree/path_lookup.hpp"
 #include "tree/reclaimer.hpp"
 #include "tree/revised_sample.hpp"
@@ -112,6 +114,7 @@ class Forest::Impl {
   /// The stamp of the edge's newest sample is made up.
   void mark_made_up(std::uint32_t slot) TFDUDE_REQUIRES(mutex_) {
     const HeldVersion& edge = frames_.newest_value(slot);
+    if (past_ != nullptr) past_->prepare(slot);
     edge.samples->set_made_up(edge.number);
   }
   /// Makes the fresh version's history another one, of which watchers have nothing.
@@ -162,6 +165,24 @@ class Forest::Impl {
   void keep_to_limit() TFDUDE_REQUIRES(mutex_) {
     if (reclaimer_.samples().bytes() > full_at_) drop_down_to_limit();
   }
+
+  // What was believed before (forest_believed.cpp).
+
+  /// From now on, as the timing of an edge says.
+  void remember(const EdgeTiming& timing) TFDUDE_REQUIRES(mutex_);
+  /// Call before these samples of the slot's edge are dropped or replaced.
+  void bury(std::uint32_t slot, const SampleHistory& samples, const SampleHistory::Range& dropped)
+      TFDUDE_REQUIRES(mutex_) {
+    if (past_ != nullptr) past_->bury(slot, samples, dropped);
+  }
+  /// Finds paths, and goes back with them to Query::believed_at. The caller has an epoch::Guard.
+  /// @return the paths then, in `former`; also as FormerEdges::take()
+  [[nodiscard]] Result<std::vector<Ends>> go_back(
+      std::optional<FormerEdges>& former, const Query& query, std::optional<Time> hint,
+      const std::function<Result<std::vector<Ends>>()>& find) const;
+  /// X_AB at Query::believed_at.
+  template <class Name>
+  [[nodiscard]] Result<StampedTransform> believed(Name a, Name b, const Query& query) const;
 
   // Handing over (forest_handover.cpp).
 
@@ -283,6 +304,8 @@ class Forest::Impl {
   /// Held frames that are being handed over; after a jump of the clock, with the time to which it
   /// has jumped back: then it clears the history when that is over.
   std::map<std::uint32_t, std::optional<std::int64_t>> frozen_ TFDUDE_GUARDED_BY(mutex_);
+  /// Null: no edge is remembered.
+  std::unique_ptr<Past> past_ TFDUDE_GUARDED_BY(mutex_);
   mutable WriteLock mutex_;
   Graph graph_ TFDUDE_GUARDED_BY(mutex_);
 
@@ -311,13 +334,18 @@ class Forest::Impl {
   void insert_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
   void show_commit() TFDUDE_REQUIRES(mutex_);
+  void remember_commit() TFDUDE_REQUIRES(mutex_);
   void tell_commit() const TFDUDE_REQUIRES(mutex_) {
     for (const auto& [whose, listener] : commit_listeners_) listener();
   }
   /// Makes the fresh version's value the newest sample.
   void append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
-  void drop_samples(SampleHistory& samples, std::int64_t newest) TFDUDE_REQUIRES(mutex_);
+  void drop_oldest(std::uint32_t slot, SampleHistory& samples) TFDUDE_REQUIRES(mutex_) {
+    bury(slot, samples, {samples.oldest(), samples.oldest() + 1});
+    samples.drop_oldest(reclaimer_.samples());
+  }
+  void drop_samples(const HeldVersion& edge) TFDUDE_REQUIRES(mutex_);
   void drop_down_to_limit() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool drop_oldest_samples() TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool drop_oldest_found() TFDUDE_REQUIRES(mutex_);
@@ -394,6 +422,7 @@ inline void Forest::Impl::commit_structure() {
 }
 
 inline void Forest::Impl::show_commit() {
+  if (past_ != nullptr) remember_commit();
   frames_.show_commit();
   // Only now: a reader of the previous commit may still reach a name through the version it sees.
   for (const Name* name : released_names_) {

@@ -18,6 +18,7 @@ void Forest::Impl::drop_down_to_limit() {
   constexpr std::size_t kMuchMore = 64;
   full_at_ = max_bytes_;
   while (reclaimer_.samples().bytes() > full_at_) {
+    if (past_ != nullptr && past_->drop_some()) continue;
     if (!drop_oldest_samples()) {
       full_at_ = reclaimer_.samples().bytes() + max_bytes_ / kMuchMore;
       return;
@@ -42,6 +43,8 @@ bool Forest::Impl::drop_oldest_found() {
     const bool is_same = edge.moving() && edge.history == oldest.history;
     if (!is_same || edge.samples->count() <= kLeast) continue;
     const bool is_oldest = edge.samples->first_stamp() <= oldest.stamp;
+    // To remember them would free nothing.
+    if (past_ != nullptr && is_oldest) past_->forget_before(oldest.slot);
     const std::size_t bytes = reclaimer_.samples().bytes();
     while (is_oldest && edge.samples->count() > kLeast && reclaimer_.samples().bytes() == bytes) {
       edge.samples->drop_oldest(reclaimer_.samples());

@@ -59,9 +59,11 @@ Result<Pose> Forest::lookup_pose(Handle a, Handle b) const {
 }
 Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b,
                                         const Query& query) const {
+  if (query.believed_at) return impl_->believed(a, b, query);
   return impl_->paths().look_up(a, b, query);
 }
 Result<StampedTransform> Forest::lookup(Handle a, Handle b, const Query& query) const {
+  if (query.believed_at) return impl_->believed(a, b, query);
   return impl_->paths().look_up(a, b, query);
 }
 

@@ -271,6 +271,7 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   SampleHistory* superseded = newest.samples;
   const Sample* before = superseded->sample(place);
   const Sample sample = sample_at(*superseded, place, value, stamp);
+  bury(newest.slot, *superseded, {place, place + 1});
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);

@@ -98,6 +98,7 @@ void Forest::Impl::replace_samples(const HeldVersion& newest, std::int64_t from,
     from = std::min(from, before.stamp(replaced.first - 1) + 1);
   }
   const std::size_t later = before.next() - replaced.end;
+  bury(newest.slot, before, replaced);
   SampleStore& store = reclaimer_.samples();
   SampleHistory* fresh = before.without(replaced, samples.size() + later, store).release();
   HeldVersion& edge = push_held(newest.slot, keeps_newest ? newest.X_PC : *samples.back().X_PC);
@@ -121,7 +122,7 @@ void Forest::Impl::replace_samples(const HeldVersion& newest, std::int64_t from,
     end_revision(edge, samples.back().revision != nullptr ? Ties::kStay : Ties::kEnd);
   }
   reclaimer_.supersede(&before);
-  drop_samples(*fresh, edge.stamp);
+  drop_samples(edge);
 }
 
 // Of those that come, only the ones that stay are added.

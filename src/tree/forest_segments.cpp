@@ -317,21 +317,31 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
                                               const Query& query, std::optional<Time> hint,
                                               bool edges, Rows rows) const {
   const epoch::Guard guard;
-  const auto ends = all_ends(impl_->frames_, segments);
-  if (!ends) return tl::unexpected(ends.error());
-  Result<SegmentValues> found = asked_segments(Own(), *ends, query, hint);
-  if (!found) {
-    return tl::unexpected(explained(std::move(found.error()), *ends, query, impl_->now_));
+  const auto find = [&] { return all_ends(impl_->frames_, segments); };
+  const auto answer = [&](const std::vector<Ends>& ends) {
+    Result<SegmentValues> found = asked_segments(Own(), ends, query, hint);
+    if (!found) {
+      found = tl::unexpected(explained(std::move(found.error()), ends, query, impl_->now_));
+      return found;
+    }
+    describe(ends, *found);
+    if (edges) tell_observed_with(ends, rows, *found);
+    return found;
+  };
+  if (query.believed_at) {
+    std::optional<FormerEdges> former;
+    const auto then = impl_->go_back(former, query, hint, find);
+    return then ? answer(*then) : tl::unexpected(then.error());
   }
-  describe(*ends, *found);
-  if (edges) tell_observed_with(*ends, rows, *found);
-  return found;
+  const auto ends = find();
+  return ends ? answer(*ends) : tl::unexpected(ends.error());
 }
 
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
                                               const RemoteEdges& others, bool motion,
                                               std::optional<Time> timed_since) const {
+  if (query.believed_at) return not_readable();
   const epoch::Guard guard;
   const auto ends = all_ends(impl_->frames_, segments);
   if (!ends) return tl::unexpected(ends.error());

@@ -138,7 +138,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
   } else {
     // First, so that the ring buffer need not grow for it. At least two samples are kept, so this
     // is not the newest.
-    if (samples->count() >= samples->timing().count) samples->drop_oldest(reclaimer_.samples());
+    if (samples->count() >= samples->timing().count) drop_oldest(newest.slot, *samples);
     if (samples->full()) {
       samples = samples->grown().release();
       reclaimer_.supersede(newest.samples);
@@ -151,7 +151,7 @@ void Forest::Impl::append_sample(const HeldVersion& newest, const GivenValue& va
   const bool goes_on = newest.moving() && !newest.lacks_sample();
   end_revision(fresh, goes_on || value.revision != nullptr ? Ties::kStay : Ties::kEnd);
   append_to(fresh, value, stamp);
-  drop_samples(*samples, stamp);
+  drop_samples(fresh);
 }
 
 void Forest::Impl::append_to(HeldVersion& fresh, const GivenValue& value, std::int64_t stamp) {
@@ -160,12 +160,11 @@ void Forest::Impl::append_to(HeldVersion& fresh, const GivenValue& value, std::i
   fresh.samples->append(stamp, fresh.commit, value, reclaimer_.samples());
 }
 
-void Forest::Impl::drop_samples(SampleHistory& samples, std::int64_t newest) {
-  const std::int64_t limit = newest - samples.timing().span.count();
+void Forest::Impl::drop_samples(const HeldVersion& edge) {
+  SampleHistory& samples = *edge.samples;
+  const std::int64_t limit = edge.stamp - samples.timing().span.count();
   const std::size_t most = samples.timing().count;
-  while (samples.count() > most || samples.first_stamp() < limit) {
-    samples.drop_oldest(reclaimer_.samples());
-  }
+  while (samples.count() > most || samples.first_stamp() < limit) drop_oldest(edge.slot, samples);
   keep_to_limit();
 }
 

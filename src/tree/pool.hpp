@@ -56,6 +56,9 @@ class Pool {
     if (free_.size() > ahead) prefetch_for_writing(free_[free_.size() - 1 - ahead]);
   }
 
+  /// Those that readers may see: those of the current commit are the last ones.
+  [[nodiscard]] const std::vector<T*>& superseded() const { return superseded_; }
+
   /// Takes an object back that the current commit has superseded, or an earlier one.
   void supersede(T* object) { superseded_.push_back(object); }
 

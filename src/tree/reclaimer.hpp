@@ -45,6 +45,11 @@ class Reclaimer {
     correlations_.superseded.emplace_back(correlation);
   }
 
+  /// See Pool::superseded().
+  [[nodiscard]] const std::vector<HeldVersion*>& superseded_held() const {
+    return held_pool_.superseded();
+  }
+
   [[nodiscard]] SampleStore& samples() { return samples_; }
 
   /// Whether collect() is due.

@@ -38,6 +38,8 @@ Result<Value> newest(const Frames& frames, Name a, Name b, const RemoteEdges& ot
 template <class Name>
 Result<StampedTransform> queried(const Frames& frames, Name a, Name b, const Query& query,
                                  const RemoteEdges& others) {
+  // What was believed before, only owners can say.
+  if (query.believed_at) return not_readable();
   const epoch::Guard guard;
   const auto found = frames.ends(a, b);
   if (!found) return tl::unexpected(found.error());

@@ -36,6 +36,12 @@ class SampleStore {
     if (--of_writer(shared).samples == 0) supersede(shared);
   }
 
+  /// For a sample that is dropped, and remembered: it shares as before.
+  void keep(const SharedPart* shared) { ++of_writer(shared).samples; }
+  /// Memory of what is remembered of samples and edges.
+  void add(std::size_t bytes) { bytes_ += bytes; }
+  void subtract(std::size_t bytes) { bytes_ -= bytes; }
+
   /// Of all samples.
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 

@@ -27,6 +27,15 @@ struct Query {
   /// if this client has read its memory before. The answer names the owner (Basis::lost). Only of
   /// Client::lookup(). Otherwise such a lookup fails with kUnreachable.
   bool last_known = false;
+  /// What the owners had committed by this instant of their clocks, instead of what they know now:
+  /// without samples that came later, observations, rewrites and new values since. `at` is absent:
+  /// the latest common time as of then. The structure is that of now: an edge that is younger, as
+  /// its frame was moved, is kTooOld. Only where EdgeTiming::believed says that it is remembered,
+  /// or nothing has changed since; otherwise kTooOld, naming the edge and since when it can be
+  /// asked for. kNotYet: ahead of an owner's clock. The answer of an owner of an earlier version is
+  /// kUnsupported. An owner looks through all samples of the edges since then, and its writers wait
+  /// meanwhile. Watches remember nothing.
+  std::optional<Time> believed_at{};
 };
 
 /// An owner that is gone.

@@ -149,11 +149,11 @@ TEST_CASE("a frame may give the correlation of its error") {
 
 TEST_CASE("limits of history are given for the file and for each frame") {
   const auto config = tfdude::parse_config(
-      "history: {span: 2.5, count: 100, max_ahead: none}\n"
+      "history: {span: 2.5, count: 100, max_ahead: none, believed: 30}\n"
       "frames:\n"
       "  - {id: a}\n"
       "  - {id: b, history: {count: 7, moving: true, process_noise: [1, 2, 3, 0.1, 0.2, 0.3], "
-      "max_ahead: 1.5, restart_after: 0}}\n",
+      "max_ahead: 1.5, restart_after: 0, believed: 0}}\n",
       "f");
   REQUIRE(config.has_value());
   CHECK(config->history.span == std::chrono::milliseconds(2500));
@@ -163,6 +163,8 @@ TEST_CASE("limits of history are given for the file and for each frame") {
   CHECK(config->history.restart_after == 5);
   CHECK(config->frames[1].timing->max_ahead == std::chrono::milliseconds(1500));
   CHECK(config->frames[1].timing->restart_after == 0);
+  CHECK(config->history.believed == std::chrono::seconds(30));
+  CHECK(config->frames[1].timing->believed.count() == 0);
   CHECK_FALSE(config->frames[0].timing.has_value());
   REQUIRE(config->frames[1].timing.has_value());
   CHECK(config->frames[1].timing->span == std::chrono::milliseconds(2500));
@@ -186,11 +188,12 @@ TEST_CASE("limits of history are given for the file and for each frame") {
   refused("{moving: perhaps}", ": moving is neither true nor false");
   refused("{spam: 1}",
           ": unknown key 'spam'; known are span, count, process_noise, drifts, moving, max_ahead, "
-          "restart_after");
+          "restart_after, believed");
   refused("{max_ahead: -1}", ": max_ahead must be 0 to 1e9 seconds, or none");
   refused("{max_ahead: .nan}", ": max_ahead is not a finite number");
   refused("{max_ahead: some}", ": max_ahead is 'some', which is not a number");
   refused("{restart_after: 1.5}", ": restart_after must be a whole number from 0");
+  refused("{believed: -1}", ": believed must be 0 to 1e6 seconds");
   refused("3", " is not a mapping");
   CHECK(tfdude::parse_config("history: {max_ahead: 0}\n", "f")->history.max_ahead.count() == 0);
   CHECK_FALSE(tfdude::parse_config("history: {span: -1}\n", "f").has_value());
