@@ -46,7 +46,9 @@ Result<LookupInProgress> LookupInProgress::plan(const Forest& forest, const Dire
                                                 ClockKind own, const WantedLookup& wanted,
                                                 const SharedHints& hints, SharedHints::Steady now) {
   const auto& [a, b, query] = wanted;
-  const auto hint = query.at ? std::nullopt : hints.guess(a, b, now);
+  // Hints are for what is known now.
+  const bool guesses = !query.at && !query.believed_at;
+  const auto hint = guesses ? hints.guess(a, b, now) : std::nullopt;
   auto plan = route_lookup(forest, directory, a, b, query, hint);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   LookupInProgress lookup(*std::move(plan), wanted, hint, now);
@@ -80,7 +82,7 @@ std::optional<Result<StampedTransform>> LookupInProgress::take(std::vector<Reply
   const bool newest =
       !plan_.parts.empty() && !std::get<LookupRequest>(plan_.parts.front().request.body).query.at;
   if (!newest || plan_.parts.size() == 1) return assembled(*answers);
-  hints.note(a_, b_, planned_, now, *answers);
+  if (!believed_) hints.note(a_, b_, planned_, now, *answers);
   slowest_ = slowest(*answers);
   OneInstant found = one_instant(*std::move(answers), hint_);
   if (!found.ask_again) return assembled(found.answers);

@@ -72,7 +72,12 @@ class LookupInProgress {
  private:
   LookupInProgress(LookupPlan plan, const WantedLookup& wanted, std::optional<Time> hint,
                    SharedHints::Steady now)
-      : plan_(std::move(plan)), a_(wanted.a), b_(wanted.b), hint_(hint), planned_(now) {}
+      : plan_(std::move(plan)),
+        a_(wanted.a),
+        b_(wanted.b),
+        believed_(wanted.query.believed_at.has_value()),
+        hint_(hint),
+        planned_(now) {}
 
   /// Says in an error about time what may be its reason: another clock, or why a second round asked
   /// for the instant.
@@ -82,6 +87,7 @@ class LookupInProgress {
   LookupPlan plan_;
   std::string a_;
   std::string b_;
+  bool believed_;                       // it is about what was believed before
   std::optional<Time> hint_;            // the instant predicted when the plan was made
   SharedHints::Steady planned_;         // then
   std::string differs_;                 // that an owner has another clock; empty: none has

@@ -48,7 +48,9 @@ std::vector<std::string> LookupManyTask::frames() const {
 Result<void> LookupManyTask::plan(const Directory& directory, Clock::time_point now) {
   restart();
   at_ = query_.at && *query_.at < Time{} ? Time{} : query_.at;
-  hint_ = query_.at ? std::nullopt : hints_.guess(key_, {}, now);
+  // Hints are for what is known now.
+  const bool guesses = !query_.at && !query_.believed_at;
+  hint_ = guesses ? hints_.guess(key_, {}, now) : std::nullopt;
   planned_at_ = now;
   Result<void> outcome;
   differs_.clear();
@@ -234,7 +236,7 @@ bool LookupManyTask::again_at_one_instant(Clock::time_point now) {
   std::vector<SegmentValues> answers;
   answers.reserve(groups_.size());
   for (const Group& group : groups_) answers.push_back(*group.answer);
-  hints_.note(key_, {}, planned_at_, now, answers);
+  if (!query_.believed_at) hints_.note(key_, {}, planned_at_, now, answers);
   OneInstant found = one_instant(std::move(answers), hint_);
   if (!found.ask_again) {
     for (std::size_t i = 0; i < groups_.size(); ++i) {

@@ -118,7 +118,11 @@ std::vector<Reply> PendingRequests::take_replies() {
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (parts_[i].owner != kHeldHere) replies_[i] = *call_.entries()[entry++].reply;
     auto* error = std::get_if<Error>(&replies_[i].body);
-    if (error != nullptr && error->partition.empty()) error->partition = parts_[i].partition;
+    if (error == nullptr || !error->partition.empty()) continue;
+    error->partition = parts_[i].partition;
+    // One of an earlier version does not know what it was asked.
+    if (error->code != Errc::kUnsupported) continue;
+    error->message.insert(0, "partition " + quote(parts_[i].partition) + ": ");
   }
   return std::move(replies_);
 }

@@ -19,6 +19,9 @@ bool may_return(Errc code) {
 }
 
 bool is_worth_waiting(const Error& error, const Query& query) {
+  // What was believed then stays as it is.
+  const bool of_time = error.code == Errc::kTooOld || error.code == Errc::kNotYet;
+  if (query.believed_at && of_time) return false;
   // For the latest common time: one edge is ahead of the data of another.
   if (error.code == Errc::kTooOld) return !query.at;
   return may_return(error.code);

@@ -44,8 +44,8 @@ Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view
   LookupTask task(structure_.forest, structure_.clock.kind(), hints_,
                   {std::string(a), std::string(b), query});
   auto asked = requests_.run(task, deadline);
-  if (!asked && asked.error().code == Errc::kUnreachable && query.last_known &&
-      memory_ != nullptr) {
+  const bool of_last = query.last_known && !query.believed_at && memory_ != nullptr;
+  if (!asked && asked.error().code == Errc::kUnreachable && of_last) {
     if (auto last = memory_->last_known(std::string(a), std::string(b), query)) return last;
   }
   if (!asked) return tl::unexpected(std::move(asked.error()));

@@ -272,8 +272,9 @@ bool MemoryReads::can_watch(const std::vector<Part>& parts) {
 
 std::optional<Reply> MemoryReads::read(const Request& request) {
   const auto* asked = std::get_if<LookupRequest>(&request.body);
-  // Of an observation more is needed than what is read.
+  // Of an observation more is needed than what is read; what was believed before is not in memory.
   if (asked == nullptr || asked->rows != Rows::kNone || !any()) return std::nullopt;
+  if (asked->query.believed_at) return std::nullopt;
   const bool of_age = asked->query.age_noise_until.has_value();
   if (of_age && other_clocks_.load(std::memory_order_relaxed)) return std::nullopt;
   const Forest& forest = structure_.forest;

@@ -151,7 +151,8 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   }
   /// Whether the last transform may be returned for this query, once there is no newer one.
   [[nodiscard]] static bool wants_newest(const Query& query) {
-    return !query.at && !query.age_noise_until && query.order == Order::kSecond;
+    return !query.at && !query.age_noise_until && query.order == Order::kSecond &&
+           !query.believed_at;
   }
   /// What is found in the memory of the owners, or was there last.
   [[nodiscard]] Result<StampedTransform> lookup_in(MemoryReads& memory, const Query& query) const;

@@ -235,6 +235,7 @@ inline void check_same(const Request& actual, const Request& expected) {
     CHECK(arrived.query.extrapolate == lookup.query.extrapolate);
     CHECK(arrived.query.age_noise_until == lookup.query.age_noise_until);
     CHECK(arrived.query.order == lookup.query.order);
+    CHECK(arrived.query.believed_at == lookup.query.believed_at);
     CHECK(arrived.hint == lookup.hint);
     CHECK(arrived.edges == lookup.edges);
     CHECK(arrived.rows == lookup.rows);

@@ -156,6 +156,9 @@ bool take(const Bytes& bytes) {
 
 [[nodiscard]] inline std::vector<Request> requests(Random& random) {
   const auto edge = [&](const std::string& id) { return EdgeUpdate{id, random.transform()}; };
+  Query believed;
+  believed.at = time_of(7);
+  believed.believed_at = time_of(1'700'000'000'000'000'000);
   return {
       {1, "hand", AddRequest{"arm", random.transform(), 4102444800000000001U}},
       {2, "hand", AddRequest{"", random.transform()}},
@@ -198,6 +201,7 @@ bool take(const Bytes& bytes) {
            2}},
       {45, "hand", LookupRequest{{{"arm", "hand"}}, {}, {}, true, Rows::kOfPath}},
       {46, "hand", LookupRequest{{{"arm", "hand"}}, {}, {}, true, Rows::kAll}},
+      {60, "hand", LookupRequest{{{"arm", "hand"}}, believed, time_of(8)}},
       {17, "hand", ConsistencyRequest{true}},
       {18, "arm", JointUpdate{{{"elbow", 0.5, 1e-4}, {"wrist", -2.0, 0}}, time_of(18)}},
       {19, "arm", JointsRequest{}},

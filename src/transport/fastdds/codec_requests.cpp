@@ -232,9 +232,11 @@ constexpr auto kReviseRows =
 constexpr auto kSegments =
     List(record(TFDUDE_FIELD(from, from, Text()), TFDUDE_FIELD(to, to, Text())));
 
+bool is_of_now(const LookupRequest& lookup) { return !lookup.query.believed_at; }
+
 bool is_plain(const LookupRequest& lookup) {
   const Query& query = lookup.query;
-  return !query.at && !lookup.hint && !query.age_noise_until &&
+  return is_of_now(lookup) && !query.at && !lookup.hint && !query.age_noise_until &&
          query.extrapolate == std::chrono::nanoseconds(0) && query.order == Order::kSecond &&
          !lookup.edges;
 }
@@ -273,6 +275,21 @@ constexpr auto kLookupAt = record(
     TFDUDE_FIELD(age_noise_until, query.age_noise_until, Stamp("the end of a lookup's noise")),
     TFDUDE_FIELD(segments, segments, kSegments), TFDUDE_FIELD(order, query.order, OrderNumber()),
     TFDUDE_FIELD_OF_ALL(edges, OfEdges()));
+
+// One is always there: that of another kind of request would be answered with what is known now.
+struct BelievedAt : Number<std::int64_t> {
+  static void write(const std::optional<Time>& value, std::int64_t& wire) {
+    wire = std::max<std::int64_t>(nanoseconds(*value), 0);
+  }
+  static Result<void> read(std::int64_t wire, std::optional<Time>& value, const Place&) {
+    if (wire < 0) return negative("the instant of a belief", wire);
+    value = time_of(wire);
+    return {};
+  }
+};
+
+constexpr auto kBelieved = record(TFDUDE_FIELD(believed_at, query.believed_at, BelievedAt()),
+                                  TFDUDE_FIELD_OF_ALL(lookup, kLookupAt));
 
 // What is pushed of each segment.
 struct OfSegments : Octet {
@@ -322,7 +339,7 @@ constexpr auto kRequestBody = cases(
     TFDUDE_CASE_IF(4, MoveRequest, move, kMove, &only_moves),
     TFDUDE_CASE(5, MoveRequest, move_and_update, kMoveAndUpdate),
     TFDUDE_CASE_IF(6, LookupRequest, lookup, kLookup, &is_plain),
-    TFDUDE_CASE(7, LookupRequest, lookup_at, kLookupAt),
+    TFDUDE_CASE_IF(7, LookupRequest, lookup_at, kLookupAt, &is_of_now),
     TFDUDE_CASE(8, WatchRequest, watch, kWatch), TFDUDE_CASE(9, HistoryRequest, history, kOfAll),
     TFDUDE_CASE_IF(10, ReviseRequest, revise, kRevise, &is_of_one_instant),
     TFDUDE_CASE(11, ConsistencyRequest, consistency, kOfAll),
@@ -337,7 +354,8 @@ constexpr auto kRequestBody = cases(
     TFDUDE_CASE(21, TimeRequest, time, kTime), TFDUDE_CASE(22, RewriteRequest, rewrite, kRewrite),
     TFDUDE_CASE(23, ReviseRequest, revise_rows, kReviseRows),
     TFDUDE_CASE(24, HandOverRequest, hand_over, kHandOver),
-    TFDUDE_CASE(25, AdoptRequest, adopt, kAdopt));
+    TFDUDE_CASE(25, AdoptRequest, adopt, kAdopt),
+    TFDUDE_CASE(26, LookupRequest, believed, kBelieved));
 
 constexpr auto kRequest = record(
     TFDUDE_FIELD(id, id, FrameId()), TFDUDE_FIELD_OF_ALL(addressee, NotOfMessage<std::uint32_t>()),

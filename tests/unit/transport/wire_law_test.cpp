@@ -138,8 +138,9 @@ std::vector<Request> random_requests(Random& random) {
   auto edges = random_edges(random, 1);
   edges.front().id = first;
   const auto named = [&] { return random_name(random); };
-  const Query query{random_stamp(random), std::chrono::nanoseconds(random.index(1000)),
-                    random_stamp(random), random.index(2) == 0 ? Order::kSecond : Order::kFourth};
+  Query query{random_stamp(random), std::chrono::nanoseconds(random.index(1000)),
+              random_stamp(random), random.index(2) == 0 ? Order::kSecond : Order::kFourth};
+  query.believed_at = random_stamp(random);
   std::vector<Request> all;
   const auto add = [&](auto body) {
     all.push_back({static_cast<std::uint32_t>(random_count(random)), first, std::move(body),
