@@ -44,11 +44,8 @@ int Question::ask(Client& client, const Common& common) const { return ask_sourc
 int Question::ask_recording(Recording& recorded, const Common& common) const {
   Source source(recorded);
   const auto instant = optional_stamp(source, at);
-  const auto believed = optional_stamp(source, believed_at);
   if (!instant) return report(instant.error(), common);
-  if (!believed) return report(believed.error(), common);
   if (*instant) source.go_to(**instant);
-  if (*believed) source.believe_as_of(**believed);
   return ask_source(source, common);
 }
 

@@ -68,8 +68,6 @@ struct Question : RecordableCommand {
   [[nodiscard]] int ask_recording(Recording& recording, const Common& common) const final;
   /// @return the exit status, or kNeedsAllFrames
   [[nodiscard]] virtual int ask_source(Source source, const Common& common) const = 0;
-
-  std::string believed_at;  ///< likewise: of a recording, when it was known what is asked for
 };
 
 }  // namespace tfdude::cli

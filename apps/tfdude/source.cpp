@@ -13,7 +13,7 @@ std::optional<Time> Source::end_for(Time stamp) const {
 Result<StampedTransform> Source::lookup(const std::string& a, const std::string& b,
                                         const Query& query, Milliseconds wait) const {
   if (client_ != nullptr) return client_->lookup(a, b, query, wait);
-  if (!query.at || *query.at < from_ || !reads_on_) return recording_->lookup(a, b, query);
+  if (!query.at || *query.at < from_ || query.believed_at) return recording_->lookup(a, b, query);
   return recording_->lookup_at(a, b, *query.at, query, wait);
 }
 

@@ -26,12 +26,6 @@ class Source {
     recording_->seek(from_);
   }
 
-  /// From now on answers with what was known at an instant of the recording, also of others.
-  void believe_as_of(Time instant) {
-    recording_->seek(instant);
-    reads_on_ = false;
-  }
-
   [[nodiscard]] bool live() const { return client_ != nullptr; }
   /// The end of a recording.
   [[nodiscard]] Result<Time> now() const { return live() ? client_->now() : end_; }
@@ -67,7 +61,8 @@ class Source {
     return live() ? client_->histories(partition) : recording_->histories(partition);
   }
   /// A recording is read on until it has the data, as Recording::lookup_at() does, but not for an
-  /// instant before the one that was gone to: of that it has what was known there.
+  /// instant before the one that was gone to, or with Query::believed_at: of that it has what was
+  /// known there.
   /// @param wait  how much of a recording is read on
   [[nodiscard]] Result<StampedTransform> lookup(const std::string& a, const std::string& b,
                                                 const Query& query, Milliseconds wait) const;
@@ -85,7 +80,6 @@ class Source {
   Recording* recording_ = nullptr;
   Time end_{};
   Time from_{};  // the instant that was gone to
-  bool reads_on_ = true;
 };
 
 }  // namespace tfdude::cli

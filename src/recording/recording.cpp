@@ -9,6 +9,7 @@
 #include "partition/routing.hpp"
 #include "recording/reading.hpp"
 #include "tree/over_fixed.hpp"
+#include "types/trajectory_builder.hpp"
 
 namespace tfdude {
 namespace {
@@ -175,11 +176,17 @@ bool Recording::step() { return impl_->reading().step() != nullptr; }
 
 Result<StampedTransform> Recording::lookup(std::string_view a, std::string_view b,
                                            const Query& query) {
+  if (query.believed_at) seek(*query.believed_at);
   return impl_->reading().lookup(a, b, query);
 }
 
 Result<StampedTransform> Recording::lookup_at(std::string_view a, std::string_view b, Time at,
                                               const Query& query, Milliseconds wait) {
+  if (query.believed_at) {
+    Query then = query;
+    then.at = at;
+    return lookup(a, b, then);
+  }
   return impl_->reading().lookup_at(a, b, query, at, wait);
 }
 
@@ -189,6 +196,7 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std
   const auto edges_to = [&](std::string_view frame, const StampedTransform& X) {
     Query then = query;
     then.at = X.stamp;
+    then.believed_at.reset();  // that is the state
     return edges_from_fixed(impl_->state().forest(), fixed, frame, then);
   };
   const auto X_FA = lookup_at(fixed, a, at_a, query);
@@ -205,7 +213,12 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std
 Trajectory Recording::trajectory(std::string_view a, std::string_view b,
                                  const std::vector<Time>& instants, const Query& query,
                                  Milliseconds wait) {
-  return impl_->reading().trajectory(a, b, instants, query, wait);
+  if (!query.believed_at) return impl_->reading().trajectory(a, b, instants, query, wait);
+  TrajectoryBuilder answers(instants.size());
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    answers.add(i, lookup_at(a, b, instants[i], query));
+  }
+  return std::move(answers).take();
 }
 
 Result<std::vector<PathSegment>> Recording::path(std::string_view a, std::string_view b) const {

@@ -364,12 +364,14 @@ Result<StampedTransform> State::lookup(std::string_view a, std::string_view b,
   LookupPlan plan;
   LookupRequest request;
   request.query = query;
+  // The state is that of then.
+  request.query.believed_at.reset();
   for (const PathSegment& segment : segments(*edges, a)) {
     plan.segments.push_back({kHeldHere, segment.from, segment.to});
     request.segments.push_back({segment.from, segment.to});
   }
   if (request.segments.empty()) return assemble(plan, {});
-  auto values = forest_.lookup_segments(request.segments, query);
+  auto values = forest_.lookup_segments(request.segments, request.query);
   if (!values) return tl::unexpected(std::move(values.error()));
   plan.parts.push_back({kHeldHere, {}, Request{0, {}, std::move(request)}});
   return assemble(plan, {*std::move(values)});

@@ -115,6 +115,11 @@ TEST_CASE("rewrite: the files and commands of the page, and what a recording the
   CHECK(slam.x("1695000001.5") == Approx(0.15));
   CHECK(slam.x("1695000003") == 8);
 
+  // The daemon of the page also remembers what was believed.
+  CHECK(slam.x("1695000001.5", {"--believed-at", before}) == 6.5);
+  CHECK(slam.x("1695000001.5", {"--believed-at", "-0"}) == Approx(0.15));
+  CHECK(slam.x("1695000001.5", {"--believed-at", "-3600"}) == -1);
+
   const auto believed = [&](const std::string& at, const std::string& when) {
     return slam.x(at, {"--recording", recorded, "--believed-at", when});
   };

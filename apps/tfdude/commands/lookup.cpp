@@ -31,12 +31,11 @@ struct Lookup final : Question {
     app.get_option("--wait")->excludes(option);
     add_recording(app);
     add_stamp(app, "--believed-at", believed_at,
-              "with --recording: what was known at this instant of that of --at, before later data "
-              "corrected it")
-        ->needs(app.get_option("--recording"))
+              "what was known at this instant of that of --at, before later data corrected it; of "
+              "the live system, if its owners remember that")
         ->excludes(option);
-    for (const char* other :
-         {"--at", "--extrapolate", "--age-noise", "--order", "--wait", "--fixed", "--recording"}) {
+    for (const char* other : {"--at", "--extrapolate", "--age-noise", "--order", "--wait",
+                              "--fixed", "--recording", "--believed-at"}) {
       redraw->excludes(app.get_option(other));
     }
   }
@@ -79,7 +78,10 @@ struct Lookup final : Question {
     Query query;
     const auto instant = optional_stamp(source, stamp);
     if (!instant) return tl::unexpected(instant.error());
+    const auto believed = optional_stamp(source, believed_at);
+    if (!believed) return tl::unexpected(believed.error());
     query.at = *instant;
+    query.believed_at = *believed;
     query.extrapolate = std::chrono::nanoseconds(static_cast<std::int64_t>(extrapolate_ms * 1e6));
     if (age_noise) {
       const auto now = source.present();
@@ -91,6 +93,7 @@ struct Lookup final : Question {
   }
 
   Path path;
+  std::string believed_at;  // as typed, see parse_stamp()
   bool watch = false;
   std::string fixed;
   std::string at_b;

@@ -88,7 +88,9 @@ class TFDUDE_EXPORT Recording {
   /// Goes to the next message. @return whether there is one
   bool step();
 
-  /// X_AB as Client::lookup() with this query answered at the instant that is shown.
+  /// X_AB as Client::lookup() with this query answered at the instant that is shown. With
+  /// Query::believed_at, here and below: goes to that instant first, and does not read on. Nothing
+  /// of the recording is too old for that.
   /// @return as Client::lookup()
   [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
                                                 const Query& query = {});

@@ -64,6 +64,15 @@ double x_at(Recording& recording, double t, double believed) {
   Query query;
   query.at = at(t);
   const auto X = recording.lookup("map", "robot", query);
+  // The same, whatever is shown.
+  query.believed_at = at(believed);
+  recording.seek(at(0));
+  CHECK(outcome(recording.lookup_at("map", "robot", at(t), query)) == outcome(X));
+  recording.seek(at(1000));
+  const auto again = recording.lookup("map", "robot", query);
+  REQUIRE(outcome(again) == outcome(X));
+  if (X) CHECK(again->pose.translation() == X->pose.translation());
+  if (X) CHECK(recording.trajectory("map", "robot", {at(t)}, query).X_AB.at(0).has_value());
   return X ? X->pose.translation().x() : -1;
 }
 
