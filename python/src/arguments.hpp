@@ -55,6 +55,6 @@ inline void check(const Result<void>& result) {
 [[nodiscard]] Order to_order(int order);
 /// A query; `order` is 2 or 4.
 [[nodiscard]] Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until,
-                             int order);
+                             int order, py::handle believed_at = py::none());
 
 }  // namespace tfdude::python

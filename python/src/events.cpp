@@ -189,14 +189,15 @@ void bind_events(py::module_& module, ClientClass& cls) {
       "_start_lookup",
       [](const Session& session, const MailboxPtr& mailbox, std::uint64_t key, const std::string& a,
          const std::string& b, py::handle at, py::handle timeout, py::handle extrapolate,
-         py::handle age_noise_until, int order) {
+         py::handle age_noise_until, int order, py::handle believed_at) {
         const Milliseconds wait =
             timeout.is_none() ? session.timeout() : to_milliseconds(timeout, "timeout");
         return start_lookup(session, mailbox, key, a, b,
-                            to_query(at, extrapolate, age_noise_until, order), wait);
+                            to_query(at, extrapolate, age_noise_until, order, believed_at), wait);
       },
       py::arg("mailbox"), py::arg("key"), py::arg("a"), py::arg("b"), py::arg("at"),
-      py::arg("timeout"), py::arg("extrapolate"), py::arg("age_noise_until"), py::arg("order"));
+      py::arg("timeout"), py::arg("extrapolate"), py::arg("age_noise_until"), py::arg("order"),
+      py::arg("believed_at") = py::none());
   bind_observing(cls);
   bind_clock(cls);
 }

@@ -7,6 +7,7 @@
 
 #include "arrays.hpp"
 #include "bind.hpp"
+#include "waiting.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -37,11 +38,12 @@ JointSpec make_joint(std::string name, const std::string& type, py::handle axis,
 }
 
 EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> count,
-                     py::handle process_noise, bool drifts) {
+                     py::handle process_noise, bool drifts, py::handle believed) {
   EdgeTiming timing;
   timing.moving = moving;
   timing.drifts = drifts;
   if (!span.is_none()) timing.span = to_duration(span, "span");
+  timing.believed = not_negative(to_duration(believed, "believed"), "believed");
   if (count) timing.count = *count;
   if (!process_noise.is_none()) {
     const StatedCovariance noise = to_covariance(process_noise, "process_noise");
@@ -53,13 +55,16 @@ EdgeTiming timing_of(bool moving, py::handle span, std::optional<std::size_t> co
 
 FrameSpec make_frame(std::string id, std::string parent, const Transform& X_PC,
                      std::optional<JointSpec> joint, bool moving, py::handle span,
-                     std::optional<std::size_t> count, py::handle process_noise, bool drifts) {
+                     std::optional<std::size_t> count, py::handle process_noise, bool drifts,
+                     py::handle believed) {
   FrameSpec frame;
   frame.id = std::move(id);
   frame.parent = std::move(parent);
   frame.X_PC = X_PC;
-  if (moving || drifts || !span.is_none() || count || !process_noise.is_none()) {
-    frame.timing = timing_of(moving, span, count, process_noise, drifts);
+  const EdgeTiming timing = timing_of(moving, span, count, process_noise, drifts, believed);
+  const bool remembers = timing.believed.count() > 0;
+  if (moving || drifts || !span.is_none() || count || !process_noise.is_none() || remembers) {
+    frame.timing = timing;
   }
   if (joint) {
     joint->joint.X_PJ = X_PC;
@@ -127,11 +132,13 @@ void bind_frames(py::module_& module) {
       "A frame of a new Node: its id, its parent ('' makes it a root), and where it is in it.\n\n"
       "joint: moves it; X_PC then is the origin. moving: samples need no stamps to count as such.\n"
       "span [s], count: how much history is kept. process_noise: covariance per second (6, 6).\n"
-      "drifts: the error is a random walk of that density, as that of odometry is.")
+      "drifts: the error is a random walk of that density, as that of odometry is. believed [s]:\n"
+      "how long it is remembered what was known before later changes: see lookup(believed_at=).")
       .def(py::init(&make_frame), py::arg("id"), py::arg("parent") = "",
            py::arg("X_PC") = Transform{}, py::kw_only(), py::arg("joint") = py::none(),
            py::arg("moving") = false, py::arg("span") = py::none(), py::arg("count") = py::none(),
-           py::arg("process_noise") = py::none(), py::arg("drifts") = false)
+           py::arg("process_noise") = py::none(), py::arg("drifts") = false,
+           py::arg("believed") = 0.0)
       .def_readonly("id", &FrameSpec::id)
       .def_readonly("parent", &FrameSpec::parent)
       .def_readonly("X_PC", &FrameSpec::X_PC, "The value at the start.")

@@ -67,14 +67,15 @@ void bind_own(ClientClass& cls) {
       "lookup",
       [](const Session& session, const std::string& a, const std::string& b, py::handle at,
          py::handle timeout, py::handle extrapolate, py::handle age_noise_until, int order,
-         bool last_known) {
-        Query query = to_query(at, extrapolate, age_noise_until, order);
+         bool last_known, py::handle believed_at) {
+        Query query = to_query(at, extrapolate, age_noise_until, order, believed_at);
         query.last_known = last_known;
         return lookup(session, a, b, query, to_milliseconds(timeout, "timeout"));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
       py::arg("timeout") = 0.0, py::arg("extrapolate") = 0.0,
       py::arg("age_noise_until") = py::none(), py::arg("order") = 2, py::arg("last_known") = false,
+      py::arg("believed_at") = py::none(),
       "X_AB, the pose of frame b in frame a.\n\n"
       "at: the instant; None: the newest for which all dynamic edges have data. timeout [s]: how\n"
       "long to wait for missing frames and data; inf: without limit. extrapolate [s]: how far an\n"
@@ -82,7 +83,11 @@ void bind_own(ClientClass& cls) {
       "or 4, of the covariance's propagation. last_known: where an owner on this computer is "
       "gone,\n"
       "the last values that this client could read in its memory; `lost` of the result names "
-      "it.\n\n"
+      "it.\n"
+      "believed_at: what the owners had committed by this instant, without what came later, if "
+      "they\n"
+      "remember it (`believed` of their history); otherwise an ExtrapolationException says since\n"
+      "when that can be asked for.\n\n"
       "Raises LookupException (no such frame), ConnectivityException (no common root),\n"
       "ExtrapolationException (no data for the instant).");
   cls.def(

@@ -79,7 +79,7 @@ TFDUDE_MEMBERS(JointInfo, &JointInfo::name, &JointInfo::frame, &JointInfo::type,
                &JointInfo::outside, &JointInfo::refused);
 TFDUDE_MEMBERS(EdgeTiming, &EdgeTiming::span, &EdgeTiming::count, &EdgeTiming::process_noise,
                &EdgeTiming::drifts, &EdgeTiming::moving, &EdgeTiming::max_ahead,
-               &EdgeTiming::restart_after);
+               &EdgeTiming::restart_after, &EdgeTiming::believed);
 TFDUDE_MEMBERS(CommonError, &CommonError::source, &CommonError::subtracts, &CommonError::loading);
 TFDUDE_MEMBERS(Correlation, &Correlation::unknown, &Correlation::common_errors,
                &Correlation::observed_with);

@@ -46,14 +46,16 @@ void bind_questions(RecordingClass& cls) {
   cls.def(
       "lookup",
       [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,
-         py::handle extrapolate, py::handle age_noise_until, int order) {
-        const Query query = to_query(at, extrapolate, age_noise_until, order);
+         py::handle extrapolate, py::handle age_noise_until, int order, py::handle believed_at) {
+        const Query query = to_query(at, extrapolate, age_noise_until, order, believed_at);
         return value_of(
             shared.call([&](Recording& recording) { return recording.lookup(a, b, query); }));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(),
       py::arg("extrapolate") = 0.0, py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
-      "X_AB as Client.lookup() answered at the instant that is shown. Raises as it does.");
+      py::arg("believed_at") = py::none(),
+      "X_AB as Client.lookup() answered at the instant that is shown. Raises as it does.\n"
+      "believed_at: goes to that instant first.");
   cls.def(
       "lookup_at",
       [](SharedRecording& shared, const std::string& a, const std::string& b, py::handle at,

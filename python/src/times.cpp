@@ -132,12 +132,14 @@ Order to_order(int order) {
   return order == 2 ? Order::kSecond : Order::kFourth;
 }
 
-Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order) {
+Query to_query(py::handle at, py::handle extrapolate, py::handle age_noise_until, int order,
+               py::handle believed_at) {
   Query query;
   query.at = to_stamp(at, "at");
   query.extrapolate = not_negative(to_duration(extrapolate, "extrapolate"), "extrapolate");
   query.age_noise_until = to_stamp(age_noise_until, "age_noise_until");
   query.order = to_order(order);
+  query.believed_at = to_stamp(believed_at, "believed_at");
   return query;
 }
 

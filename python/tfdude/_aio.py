@@ -71,6 +71,7 @@ async def lookup_async(
     extrapolate: _Duration = 0.0,
     age_noise_until: _Instant | None = None,
     order: Literal[2, 4] = 2,
+    believed_at: _Instant | None = None,
 ) -> _core.StampedTransform:
     """X_AB, as lookup(), for asyncio: `X = await client.lookup_async(a, b)`.
 
@@ -81,7 +82,7 @@ async def lookup_async(
     hub = _hubs.get(loop)
     if hub is None:
         hub = _hubs[loop] = _Hub()
-    return await hub.lookup(self, a, b, at, timeout, extrapolate, age_noise_until, order)
+    return await hub.lookup(self, a, b, at, timeout, extrapolate, age_noise_until, order, believed_at)
 
 
 # Those who wait for a mailbox, by its descriptor: a loop has one reader for each.

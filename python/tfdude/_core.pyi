@@ -455,6 +455,7 @@ class FrameSpec:
         count: int | None = None,
         process_noise: npt.ArrayLike | None = None,
         drifts: bool = False,
+        believed: _Duration = 0.0,
     ) -> None: ...
     @property
     def id(self) -> str: ...
@@ -642,6 +643,7 @@ class Client:
         age_noise_until: _Instant | None = None,
         order: Literal[2, 4] = 2,
         last_known: bool = False,
+        believed_at: _Instant | None = None,
     ) -> StampedTransform: ...
     @overload
     def transform(
@@ -705,6 +707,7 @@ class Client:
         extrapolate: _Duration = 0.0,
         age_noise_until: _Instant | None = None,
         order: Literal[2, 4] = 2,
+        believed_at: _Instant | None = None,
     ) -> StampedTransform: ...
     @overload
     def lookup_many(
@@ -823,6 +826,7 @@ class Client:
         extrapolate: _Duration,
         age_noise_until: _Instant | None,
         order: int,
+        believed_at: _Instant | None = None,
     ) -> _PendingLookup: ...
 
 class Node(Client):
@@ -891,6 +895,7 @@ class Recording:
         extrapolate: _Duration = 0.0,
         age_noise_until: _Instant | None = None,
         order: Literal[2, 4] = 2,
+        believed_at: _Instant | None = None,
     ) -> StampedTransform: ...
     def lookup_at(self, a: str, b: str, at: _Instant, *, timeout: _Duration = 10.0) -> StampedTransform: ...
     def trajectory(

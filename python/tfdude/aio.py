@@ -60,6 +60,7 @@ class Client:
         extrapolate: _Duration = 0.0,
         age_noise_until: _Instant | None = None,
         order: Any = 2,
+        believed_at: _Instant | None = None,
     ) -> _core.StampedTransform:
         """As lookup_async(): waits up to timeout [s] (None: the client's), without a thread."""
         return await lookup_async(
@@ -71,6 +72,7 @@ class Client:
             extrapolate=extrapolate,
             age_noise_until=age_noise_until,
             order=order,
+            believed_at=believed_at,
         )
 
     def events(self) -> Events:
