@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "tfdude/math/perturbation.hpp"
 
@@ -23,6 +24,18 @@ bool carries_on(const Matrix6d& F, const CommonError& a, const CommonError& b) {
   if (a.source != b.source || a.subtracts != b.subtracts) return false;
   if (a.loading.cols() != b.loading.cols()) return false;
   return (F * a.loading - b.loading).norm() <= kRoundingOfSum * b.loading.norm();
+}
+
+// Whether a value has all sources of observations that another one has. It has none of further
+// columns of an observation in which it has no share, but always the first source.
+bool has_all(const Belief& X, const Belief& other) {
+  const auto has = [&](const CommonError& one) {
+    const std::string first = one.source.substr(0, one.source.find('+'));
+    return std::any_of(X.common_errors.begin(), X.common_errors.end(),
+                       [&](const CommonError& own) { return own.source == first; });
+  };
+  return std::all_of(other.common_errors.begin(), other.common_errors.end(),
+                     [&](const CommonError& one) { return !is_observed(one) || has(one); });
 }
 
 }  // namespace
@@ -53,6 +66,14 @@ std::optional<Drift> drift_between(const Belief& earlier, const Belief& later) {
   }) * scale.asDiagonal();
   drift.added = Covariance::trusted(Matrix6d(0.5 * (added + added.transpose())));
   return drift;
+}
+
+bool are_corrected_together(const Belief& a, const Belief& b) {
+  if (a.unknown || b.unknown || a.unspecified || b.unspecified) return false;
+  const auto was_observed = [](const Belief& X) {
+    return std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
+  };
+  return was_observed(a) && was_observed(b) && has_all(a, b) && has_all(b, a);
 }
 
 }  // namespace tfdude

@@ -20,4 +20,9 @@ struct Drift {
 ///   corrected it alone
 [[nodiscard]] std::optional<Drift> drift_between(const Belief& earlier, const Belief& later);
 
+/// Of an edge that drifts: whether the same observations have corrected both values, so that what
+/// is left of their errors is of the same sources, and lasts from one to the other. Their own parts
+/// may be correlated in any way.
+[[nodiscard]] bool are_corrected_together(const Belief& a, const Belief& b);
+
 }  // namespace tfdude

@@ -56,7 +56,8 @@ class Sum {
  public:
   void add(const EdgeAtEnds& edge, const Gains& gains) {
     const std::optional<Drift> drift = drift_of(edge);
-    const bool lasts = drift.has_value();
+    const bool lasts =
+        drift.has_value() || (edge.drifts && are_corrected_together(edge.before, edge.after));
     total_ += of_ends(drift, gains, edge.before.own, edge.after.own);
     add_unknown(edge, gains);
     for (const CommonError& one : edge.before.common_errors) {

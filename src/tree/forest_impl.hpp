@@ -253,10 +253,20 @@ class Forest::Impl {
                  std::int64_t stamp) TFDUDE_REQUIRES(mutex_);
   /// Makes the row of a dynamic edge's newest sample that of the edge.
   void show_revision(std::uint32_t slot) TFDUDE_REQUIRES(mutex_);
+  /// Whether watchers are told of a corrected sample at once. To tell all earlier ones with each
+  /// observation would take many times the bytes; they have what they were told last.
+  enum class Telling : std::uint8_t { kNow, kLater };
   /// Corrects a dynamic edge at an instant. If it drifts, later samples have the same error, up to
   /// the next one that was observed itself.
   void revise_sample(const HeldVersion& newest, const Revision& revision, std::int64_t stamp,
-                     const RowInfo& row) TFDUDE_REQUIRES(mutex_);
+                     const RowInfo& row, Telling telling) TFDUDE_REQUIRES(mutex_);
+  /// Corrects the samples after a row, up to the next one. @param row  number of its sample
+  void carry_on(std::uint32_t slot, std::uint64_t row, Telling telling) TFDUDE_REQUIRES(mutex_);
+  /// Gives consecutive samples, at least one, other values.
+  /// @param follows  stamp of the row that they follow
+  void replace_followers(const HeldVersion& edge, std::uint64_t first, std::int64_t follows,
+                         const std::vector<CorrelatedValue>& values, Telling telling)
+      TFDUDE_REQUIRES(mutex_);
   /// Corrects a dynamic edge at the instants of the revisions, sorted by their stamps.
   /// @param stamp  of those that have none
   void revise_samples(std::uint32_t slot, const std::vector<const Revision*>& revisions,
@@ -283,8 +293,8 @@ class Forest::Impl {
   [[nodiscard]] static ChangedEdge kept(const HeldVersion& edge);
   /// Replaces the dynamic edge's sample with that stamp, or inserts it. The value is taken as it
   /// is: the error of an edge that drifts is in it already.
-  void replace_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp)
-      TFDUDE_REQUIRES(mutex_);
+  void replace_sample(const HeldVersion& newest, const GivenValue& value, std::int64_t stamp,
+                      Telling telling = Telling::kNow) TFDUDE_REQUIRES(mutex_);
 
   const std::shared_ptr<Arena> arena_;
   Frames frames_;

@@ -7,6 +7,7 @@
 #include "base/saturating.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/row_ways.hpp"
 #include "tree/sample_rows.hpp"
 
 // What observations make of the values and samples of edges.
@@ -91,7 +92,7 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
 }
 
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
-                                 std::int64_t stamp, const RowInfo& row) {
+                                 std::int64_t stamp, const RowInfo& row, Telling telling) {
   SampleRevision fresh{revision.X_PC, revision.correlation, row};
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
@@ -110,22 +111,70 @@ void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revi
   }
   const std::uint32_t slot = newest.slot;
   const bool carries_on = drifts(newest);
-  replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp);
-  std::uint64_t number = frames_.newest_value(slot).samples->place_of(stamp);
-  while (carries_on && ++number < frames_.newest_value(slot).samples->next()) {
-    const SampleHistory& samples = *frames_.newest_value(slot).samples;
-    const Sample& later = *samples.sample(number);
-    if (later.revision() != nullptr && later.revision()->row.observed) break;
-    const Sample& before = *samples.sample(number - 1);
-    const std::int64_t at = later.stamp;
-    const CorrelatedValue value =
-        drifted(before, nullptr, given(later).pose,
-                {samples.timing().process_noise, static_cast<double>(at - before.stamp) * 1e-9});
-    const SampleRevision moved{
-        {given(later).pose, {}}, value.correlation, {false, is_between(later), 0, stamp}};
-    replace_sample(frames_.newest_value(slot), {value.X_PC, nullptr, &moved}, at);
-  }
+  replace_sample(newest, {revision.X_PC, nullptr, &fresh}, stamp, telling);
+  if (carries_on) carry_on(slot, frames_.newest_value(slot).samples->place_of(stamp), telling);
   if (carries_on || frames_.newest_value(slot).stamp == stamp) show_revision(slot);
+}
+
+// Samples between two rows follow from both. After the last one, each follows from the one before.
+void Forest::Impl::carry_on(std::uint32_t slot, std::uint64_t row, Telling telling) {
+  const HeldVersion& edge = frames_.newest_value(slot);
+  const SampleHistory& samples = *edge.samples;
+  const Sample& first = *samples.sample(row);
+  std::uint64_t end = row + 1;
+  const auto is_row = [](const Sample& sample) {
+    return sample.revision() != nullptr && sample.revision()->row.observed;
+  };
+  while (end < samples.next() && !is_row(*samples.sample(end))) ++end;
+  if (end == row + 1) return;
+  const Sample* second = end < samples.next() ? samples.sample(end) : nullptr;
+  const auto is_sound = [](const Sample& sample) {
+    return sample.complete() && !sample.revision()->correlation().unknown;
+  };
+  const bool tied = second != nullptr && second->revision()->row.before == first.stamp &&
+                    is_sound(first) && is_sound(*second);
+  std::vector<CorrelatedValue> values;
+  if (tied) values = values_between(edge, row, end);
+  Transform X = first.value();
+  const Correlation* correlation = &first.revision()->correlation();
+  for (std::uint64_t number = row + 1; !tied && number < end; ++number) {
+    const Sample& before = *samples.sample(number - 1);
+    const Sample& here = *samples.sample(number);
+    const Walk walk{samples.timing().process_noise,
+                    static_cast<double>(here.stamp - before.stamp) * 1e-9};
+    const Pose increment = given(before).pose.inverse() * given(here).pose;
+    values.push_back(drifted(X, correlation, increment, walk));
+    X = values.back().X_PC;
+    correlation = &values.back().correlation;
+  }
+  replace_followers(edge, row + 1, first.stamp, values, telling);
+}
+
+void Forest::Impl::replace_followers(const HeldVersion& edge, std::uint64_t first,
+                                     std::int64_t follows,
+                                     const std::vector<CorrelatedValue>& values, Telling telling) {
+  SampleHistory* superseded = edge.samples;
+  const std::uint64_t end = first + values.size();
+  const bool to_newest = end == superseded->next();
+  HeldVersion& fresh = push_held(edge.slot, to_newest ? values.back().X_PC : edge.X_PC);
+  if (to_newest) end_revision(fresh, Ties::kStay);
+  bury(edge.slot, *superseded, {first, end});
+  std::vector<Sample> samples;
+  bool begins = superseded->has_instants(end);
+  for (std::uint64_t number = first; number < end; ++number) {
+    const Sample& before = *superseded->sample(number);
+    const CorrelatedValue& value = values[number - first];
+    const SampleRevision moved{
+        {given(before).pose, {}}, value.correlation, {false, is_between(before), 0, follows}};
+    begins = begins || superseded->has_instants(number);
+    samples.push_back(sample_at(*superseded, number, {value.X_PC, nullptr, &moved}, before.stamp));
+    if (telling == Telling::kLater) samples.back().commit = before.commit;
+    reclaimer_.samples().release(before.shared);
+  }
+  fresh.samples = superseded->replaced(samples, first, reclaimer_.samples()).release();
+  fresh.samples->rewritten = fresh.commit;
+  if (begins) begin_again(fresh);
+  reclaimer_.supersede(superseded);
 }
 
 // What an observation has made of the samples from one instant until another is an error of their
@@ -181,12 +230,15 @@ void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Re
       shares_observation(last->revision()->correlation(), revisions.front()->correlation)) {
     untie_samples(slot, until, stamp_of(*revisions.front(), stamp));
   }
+  const bool tells_all = lasts > 0 || !drifts(edge);
   // The latest first: the samples after each row are carried on up to the next one.
   for (std::size_t i = revisions.size(); i-- > 0;) {
     const std::int64_t at = stamp_of(*revisions[i], stamp);
     const bool follows = i > 0 && is_tied(*revisions[i - 1]);
     const std::int64_t before = follows ? stamp_of(*revisions[i - 1], stamp) : kAlways;
-    revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before});
+    const bool is_last = i + 1 == revisions.size();
+    revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before},
+                  is_last || tells_all ? Telling::kNow : Telling::kLater);
   }
   if (merges(revisions)) {
     frames_.newest_value(slot).samples->set_observed(frames_.commit_being_made());
@@ -262,7 +314,7 @@ void Forest::Impl::give_between(const HeldVersion& newest, const Sample& there, 
 }
 
 void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& value,
-                                  std::int64_t stamp) {
+                                  std::int64_t stamp, Telling telling) {
   const std::uint64_t place = newest.samples->place_of(stamp);
   if (place == newest.samples->next() || newest.samples->stamp(place) != stamp) {
     push_checked(newest, value, stamp);
@@ -270,13 +322,14 @@ void Forest::Impl::replace_sample(const HeldVersion& newest, const GivenValue& v
   }
   SampleHistory* superseded = newest.samples;
   const Sample* before = superseded->sample(place);
-  const Sample sample = sample_at(*superseded, place, value, stamp);
+  Sample sample = sample_at(*superseded, place, value, stamp);
+  if (telling == Telling::kLater) sample.commit = before->commit;
   bury(newest.slot, *superseded, {place, place + 1});
   reclaimer_.samples().release(before->shared);
   const bool is_newest = newest.stamp == stamp;
   HeldVersion& fresh = push_held(newest.slot, is_newest ? value.X_PC : newest.X_PC);
   if (is_newest) end_revision(fresh, value.revision != nullptr ? Ties::kStay : Ties::kEnd);
-  fresh.samples = superseded->replaced(sample, place, reclaimer_.samples()).release();
+  fresh.samples = superseded->replaced({sample}, place, reclaimer_.samples()).release();
   fresh.samples->rewritten = fresh.commit;
   // Its partners do not know the edge any more, so that no other sample is tied to them for sure.
   if (is_newest && value.revision == nullptr) fresh.samples->set_observed(fresh.commit);

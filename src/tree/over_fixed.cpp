@@ -165,6 +165,11 @@ class TwoWays {
       }
       return;
     }
+    const bool drifts = earlier.drifts && later.drifts;
+    if (drifts && are_corrected_together(earlier.X_PC, later.X_PC)) {
+      lasting_.push_back(of_a.id);
+      return allow_any_own(in_a, in_b);
+    }
     allow_any(in_a, in_b);
   }
 
@@ -183,18 +188,22 @@ class TwoWays {
   // The own errors at both instants may be correlated in any way. They are independent of all
   // others, unless an observation has tied them.
   void allow_any(std::size_t in_a, std::size_t in_b) {
+    const Belief& of_a = a_.edges[in_a].X_PC;
+    const Belief& of_b = b_.edges[in_b].X_PC;
+    const bool any = !is_zero(of_a.own) || !is_zero(of_b.own);
+    if (!any || !(is_tied(of_a) || is_tied(of_b))) return allow_any_own(in_a, in_b);
+    bound_ = true;
+    // What the observation subtracts is of the own part, so one of both values stays whole.
+    const bool keeps_a = is_tied(of_a);
+    take_whole(keeps_a ? b_ : a_, keeps_a ? in_b : in_a);
+  }
+  void allow_any_own(std::size_t in_a, std::size_t in_b) {
     Belief& of_a = a_.edges[in_a].X_PC;
     Belief& of_b = b_.edges[in_b].X_PC;
     if (is_zero(of_a.own) && is_zero(of_b.own)) return;
     bound_ = true;
     const Covariance A = mapped(a_.gains[in_a], of_a.own);
     const Covariance B = mapped(b_.gains[in_b], of_b.own);
-    if (is_tied(of_a) || is_tied(of_b)) {
-      // What the observation subtracts is of the own part, so one of both values stays whole.
-      const bool keeps_a = is_tied(of_a);
-      take_whole(keeps_a ? b_ : a_, keeps_a ? in_b : in_a);
-      return;
-    }
     const BoundWeights weights = bound_weights(A, B);
     scale(of_a.own, weights.of_A);
     scale(of_b.own, weights.of_B);

@@ -27,10 +27,13 @@ Belief belief_of(const Sample& sample, const Correlation* said) {
   return belief;
 }
 
-// Whether an observation has found the second sample elsewhere than where the first one and the way
+// Whether observations have found the second sample elsewhere than where the first one and the way
 // between both lead.
 bool is_found_elsewhere(const Sample& before, const Sample& after) {
-  if (after.revision() == nullptr || !after.revision()->row.observed) return false;
+  if (after.revision() == nullptr) return false;
+  // From a row on, it is on the way that was given, which may have come later.
+  const bool follows_row = before.revision() == nullptr || before.revision()->row.observed;
+  if (follows_row && !after.revision()->row.observed) return false;
   constexpr double kRounding = 1e-9;
   const Pose way = given(before).pose.inverse() * given(after).pose;
   const Pose led = before.value_pose() * way;
@@ -121,22 +124,25 @@ Transform whole(const Sample& sample, const Correlation* said) {
   return revision != nullptr ? whole(X, revision->correlation(), said) : X;
 }
 
-CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pose& G_PC,
+CorrelatedValue drifted(const Transform& X, const Correlation* correlation, const Pose& increment,
                         const Walk& walk) {
-  const SharedRevision* revision = before.revision();
-  const Transform X = before.value();
-  const Pose increment = (revision != nullptr ? revision->given.pose : X.pose).inverse() * G_PC;
   const Pose back = increment.inverse();
-  CorrelatedValue found{{G_PC, X.covariance.of_specified().transported(back)}, {}};
-  if (revision != nullptr) found.X_PC.pose = X.pose * increment;
+  CorrelatedValue found{{X.pose * increment, X.covariance.of_specified().transported(back)}, {}};
   found.X_PC.covariance += walked(walk.density, increment, walk.seconds);
   found.X_PC.covariance.set_complete(X.covariance.complete());
-  if (const Correlation* correlation = correlation_at(before, said)) {
-    found.correlation = *correlation;
-    if (!correlation->common_errors.empty()) {
-      found.correlation.common_errors = times(adjoint(back), correlation->common_errors);
-    }
+  if (correlation == nullptr) return found;
+  found.correlation = *correlation;
+  if (!correlation->common_errors.empty()) {
+    found.correlation.common_errors = times(adjoint(back), correlation->common_errors);
   }
+  return found;
+}
+
+CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pose& G_PC,
+                        const Walk& walk) {
+  const Pose increment = given(before).pose.inverse() * G_PC;
+  CorrelatedValue found = drifted(before.value(), correlation_at(before, said), increment, walk);
+  if (before.revision() == nullptr) found.X_PC.pose = G_PC;
   return found;
 }
 

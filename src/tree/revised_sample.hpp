@@ -33,6 +33,9 @@ struct Walk {
 /// @param walk  from the other to this one
 [[nodiscard]] CorrelatedValue drifted(const Sample& before, const Correlation* said,
                                       const Pose& G_PC, const Walk& walk);
+/// The same of a value. @param increment  the way since, as it was given
+[[nodiscard]] CorrelatedValue drifted(const Transform& X_PC, const Correlation* correlation,
+                                      const Pose& increment, const Walk& walk);
 
 /// The value of an edge that drifts, between two samples: that of the first one, and what the drift
 /// has added since. If an observation has corrected the second sample, but not the first, a bound:

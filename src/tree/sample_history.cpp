@@ -185,15 +185,19 @@ std::int64_t SampleHistory::kept_before(std::uint64_t history) const {
   return history != 0 && found != earlier_.end() ? found->kept_before : kAlways;
 }
 
-SampleHistory::Pointer SampleHistory::replaced(const Sample& sample, std::uint64_t place,
-                                               SampleStore& store) const {
-  auto with_other = copy(mask_ + 1, next_);
-  SampleChunk* fresh = store.take_chunk();
-  *fresh = *chunk(place);
-  store.supersede(chunk(place));
-  with_other->put(fresh);
-  with_other->rewrite(sample, place);
-  return with_other;
+SampleHistory::Pointer SampleHistory::replaced(const std::vector<Sample>& samples,
+                                               std::uint64_t place, SampleStore& store) const {
+  auto with_others = copy(mask_ + 1, next_);
+  for (std::size_t i = 0; i < samples.size(); ++i, ++place) {
+    if (i == 0 || place % kSize == 0) {
+      SampleChunk* fresh = store.take_chunk();
+      *fresh = *chunk(place);
+      store.supersede(chunk(place));
+      with_others->put(fresh);
+    }
+    with_others->rewrite(samples[i], place);
+  }
+  return with_others;
 }
 
 }  // namespace tfdude

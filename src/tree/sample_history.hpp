@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "base/saturating.hpp"
 #include "tree/forest.hpp"
@@ -174,8 +175,9 @@ class SampleHistory {
   /// A copy with one more sample, inserted at `place`, which is not after the newest.
   [[nodiscard]] Pointer with(const Sample& sample, std::uint64_t place, SampleStore& store) const;
 
-  /// A copy in which `sample` replaces one with the same stamp.
-  [[nodiscard]] Pointer replaced(const Sample& sample, std::uint64_t place,
+  /// A copy in which these samples replace consecutive ones with the same stamps.
+  /// @param place  number of the first of them
+  [[nodiscard]] Pointer replaced(const std::vector<Sample>& samples, std::uint64_t place,
                                  SampleStore& store) const;
 
   /// Consecutive samples: from the number `first` up to that before `end`.

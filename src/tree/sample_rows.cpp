@@ -6,14 +6,12 @@
 #include <string_view>
 #include <utility>
 
-#include "tfdude/math/interpolate.hpp"
-#include "tfdude/math/perturbation.hpp"
+#include "tfdude/math/observation.hpp"
 
 #include "math/common_errors.hpp"
-#include "math/random_walk.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
-#include "tree/revised_sample.hpp"
+#include "tree/row_ways.hpp"
 
 namespace tfdude {
 namespace {
@@ -61,108 +59,32 @@ bool is_long_ago(const HeldVersion& edge, const Sample& row) {
   return after != nullptr && after->stamp > row.stamp;
 }
 
-// How the edge has moved from one instant to a later one, as it was told, and what the drift has
-// added at the later one.
-struct Way {
-  Pose increment;
-  Matrix6d added = Matrix6d::Zero();
-
-  [[nodiscard]] Matrix6d carry() const { return adjoint(increment.inverse()); }
-};
-
-Pose given_at(const HeldVersion& edge, std::int64_t t) {
-  if (const Sample* there = sample_at(edge, t)) return given(*there).pose;
-  std::uint64_t back = 0;
-  const auto [before, after] = edge.samples->around(t, edge.number, back);
-  Pose G_PC;
-  if (before == nullptr || after == nullptr) return G_PC;
-  const double s =
-      static_cast<double>(t - before->stamp) / static_cast<double>(after->stamp - before->stamp);
-  interpolate(given(*before).pose, given(*after).pose, s, G_PC);
-  return G_PC;
-}
-
-// Sample by sample, as the values of the samples were computed.
-Way way_between(const HeldVersion& edge, std::int64_t from, std::int64_t to) {
-  std::vector<const Sample*> on_way;
-  for (std::uint64_t number = edge.number + 1; number-- > edge.samples->oldest();) {
-    const Sample* sample = edge.samples->sample(number);
-    if (sample == nullptr || sample->stamp <= from) break;
-    if (sample->stamp < to) on_way.push_back(sample);
-  }
-  const Covariance& density = edge.samples->timing().process_noise;
-  Way way;
-  Pose here = given_at(edge, from);
-  std::int64_t now = from;
-  const auto go = [&](const Pose& next, std::int64_t then) {
-    const Pose step = here.inverse() * next;
-    const Matrix6d back = adjoint(step.inverse());
-    const Covariance more = walked(density, step, static_cast<double>(then - now) * 1e-9);
-    way.added = (back * way.added * back.transpose() + more.matrix()).eval();
-    way.increment = way.increment * step;
-    here = next;
-    now = then;
-  };
-  for (std::size_t i = on_way.size(); i-- > 0;) go(given(*on_way[i]).pose, on_way[i]->stamp);
-  go(given_at(edge, to), to);
-  return way;
-}
-
-RowOfSample as_stored(const Sample& sample, std::size_t segment, const Correlation* said) {
-  RowOfSample row{static_cast<std::uint32_t>(segment), time_of(sample.stamp), sample.value(), {}};
-  const Correlation* correlation = correlation_at(sample, said);
-  if (correlation == nullptr) return row;
-  row.correlation.common_errors = correlation->common_errors;
-  row.correlation.observed_with = correlation->observed_with;
-  return row;
+// How many rows are kept, besides one that an observation adds. They leave room for all edges that
+// it was observed with.
+std::size_t kept_rows(const HeldVersion& edge, const std::vector<const Sample*>& rows) {
+  const std::size_t together = partners_of(edge, *rows.front()).size() + 1;
+  const std::size_t room = kMaxObservedTogether - std::min(together, kMaxObservedTogether);
+  const std::size_t most = std::min({rows.size(), kFewestRows, room});
+  std::size_t recent = 0;
+  while (recent < most && !is_long_ago(edge, *rows[recent])) ++recent;
+  const std::size_t lasts = rows.front()->revision()->row.lasts;
+  return std::max(recent, (lasts + kRowLasts - 1) / kRowLasts);
 }
 
 std::string own_prefix() { return std::string(kObservedPrefix) + '@'; }
 
 // Its own part becomes an error that others may have in common with it. Its name is one that no
 // other sample, and no other value of this one, has anywhere.
-void share_own(const HeldVersion& edge, const Sample& sample, RowOfSample& row) {
+// @param commit  of the last observation that has changed it
+void share_own(const HeldVersion& edge, std::uint64_t commit, RowOfSample& row) {
   Loading root = root_of(row.X_PC.covariance.of_specified().matrix());
   if (root.cols() == 0) return;
   const auto text = [](auto number) { return std::to_string(number); };
   row.correlation.common_errors.push_back(
-      {own_prefix() + text(std::hash<std::string_view>()(edge.name->text)) + "." +
-           text(sample.commit) + "." + text(sample.stamp),
+      {own_prefix() + text(std::hash<std::string_view>()(edge.name->text)) + "." + text(commit) +
+           "." + text(nanoseconds(row.stamp)),
        false, std::move(root)});
   row.X_PC.covariance = Covariance();
-}
-
-// A value at an instant beside some rows.
-struct Tied {
-  Pose X_PC;
-  Matrix6d own = Matrix6d::Zero();
-  bool unknown = false;
-  std::vector<CommonError> common_errors;
-};
-
-Tied after_row(const RowOfSample& row, const Way& way) {
-  return {row.X_PC.pose * way.increment, way.added, false,
-          times(way.carry(), row.correlation.common_errors)};
-}
-
-Tied between_rows(const RowOfSample& first, const Way& to, const Way& from,
-                  const RowOfSample& second) {
-  const Matrix6d F = from.carry();
-  const Bridge bridge = bridged(to.added, F, from.added);
-  const Matrix6d& K = bridge.K;
-  const Pose forward = first.X_PC.pose * to.increment;
-  const Twist missed = log((forward * from.increment).inverse() * second.X_PC.pose);
-  Tied tied{forward * exp(Twist(K * missed)), bridge.rest, false,
-            times((Matrix6d::Identity() - K * F) * to.carry(), first.correlation.common_errors)};
-  add_errors(times(K, second.correlation.common_errors), tied.common_errors);
-  return tied;
-}
-
-Tied before_row(const Way& way, const RowOfSample& row) {
-  const Pose back = way.increment.inverse();
-  const Matrix6d F = adjoint(way.increment);
-  return {row.X_PC.pose * back, F * way.added * F.transpose(), !way.added.isZero(0),
-          times(F, row.correlation.common_errors)};
 }
 
 void set_value(const Tied& tied, std::size_t i, SegmentValues& found) {
@@ -258,7 +180,7 @@ void share_later(const HeldVersion& edge, std::int64_t t, const Sample& later, R
   const bool complete = own.complete();
   own = Covariance::trusted(nearest_semidefinite(rest));
   own.set_complete(complete);
-  share_own(edge, later, row);
+  share_own(edge, later.commit, row);
   auto& errors = found.correlations[row.segment].common_errors;
   add_errors(times(share, {row.correlation.common_errors.back()}), errors);
 }
@@ -322,11 +244,13 @@ std::vector<std::string> tell_rows(const HeldVersion& edge, std::size_t segment,
   if (rows.empty()) return alone();
   const Sample& last = *rows.front();
   const bool later = t > last.stamp;
-  const bool only = later && last.revision()->row.lasts == 0;
+  const std::size_t kept = kept_rows(edge, rows);
+  const bool only = later && kept == 0;
   if (only && (asked == Rows::kOfPath || is_long_ago(edge, last))) return alone();
   const Correlation* said = said_of(edge);
   const Correlation& correlation = last.revision()->correlation();
   if (correlation.unknown || !last.complete()) {
+    if (asked == Rows::kOfPath && later) return alone();
     if (asked == Rows::kOfPath && t < last.stamp) untie(segment, found);
     return partners_of(edge, last);
   }
@@ -335,15 +259,16 @@ std::vector<std::string> tell_rows(const HeldVersion& edge, std::size_t segment,
   const auto there =
       std::find_if(rows.begin(), rows.end(), [&](const Sample* row) { return row->stamp <= t; });
   const auto k = static_cast<std::size_t>(there - rows.begin());
-  const std::size_t kept = (last.revision()->row.lasts + kRowLasts - 1) / kRowLasts;
-  // After an observation in order there is one more, until the next.
-  const std::size_t most = asked == Rows::kAll ? kept + 1 : std::max(kept, later ? 1 : k + 1);
+  const bool at_row = k < rows.size() && rows[k]->stamp == t;
+  // After an observation there is one more than are kept, until the next.
+  const std::size_t more = asked == Rows::kAll || at_row ? 1 : 0;
+  const std::size_t most = std::max(kept + more, later ? 1 : k + 1);
   if (told.size() > most) told.resize(most);
-  if (asked == Rows::kOfPath && k < rows.size() && rows[k]->stamp == t) {
+  if (asked == Rows::kOfPath && at_row) {
     told.erase(told.begin() + static_cast<std::ptrdiff_t>(k));
   } else if (asked == Rows::kOfPath) {
-    if (k < rows.size()) share_own(edge, *rows[k], told[k]);
-    if (k > 0) share_own(edge, *rows[k - 1], told[k - 1]);
+    if (k < rows.size()) share_own(edge, last.commit, told[k]);
+    if (k > 0) share_own(edge, last.commit, told[k - 1]);
     const auto way_to = [&] { return way_between(edge, rows[k]->stamp, t); };
     const auto way_from = [&] { return way_between(edge, t, rows[k - 1]->stamp); };
     const Tied tied = k == 0             ? after_row(told[0], way_to())

@@ -16,9 +16,12 @@ namespace tfdude {
 /// How many instants are kept as rows, at most. An observation costs that many more edges.
 inline constexpr std::size_t kMostRows = 8;
 
-/// For how many instants that are observed in order each row is kept longer than the one before it,
-/// after an observation that needed it. Before the first late observation there is only one row,
-/// which costs nothing.
+/// How many are kept of an edge that has not been observed late, too, if few samples follow them:
+/// the past that lookups mostly ask for, of sensors that take time.
+inline constexpr std::size_t kFewestRows = 4;
+
+/// For how many instants that are observed in order each further row is kept longer than the one
+/// before it, after an observation that needed it.
 inline constexpr std::size_t kRowLasts = 31;
 
 /// RowInfo::lasts of so many rows.

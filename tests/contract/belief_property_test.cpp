@@ -1,12 +1,14 @@
 // Random trees of several owners, whose edges get new values, samples and positions of joints,
 // drift, are observed now and in the past, added, moved and removed. The covariance of every pair
 // of frames is that of a dense joint filter, which knows nothing of columns, samples or owners, or
-// larger, where observations come later than others of the same edges. All measurements agree with
+// larger, where observations come later than others of the same edges. So it is at the last
+// instants at which an edge that drifts was observed, and between them. All measurements agree with
 // the estimate, so that poses stay and one linearization holds.
 
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +25,7 @@
 #include "support/random.hpp"
 #include "support/random_walk.hpp"
 #include "support/sanitizers.hpp"
+#include "tree/sample_rows.hpp"
 
 namespace tfdude {
 namespace {
@@ -161,8 +164,14 @@ class Robot {
       for (const auto& [b, of_b] : parents_) {
         if (a >= b) continue;
         compare(a, b, newest_, sightings_ == Sightings::kInOrder);
-        // Later observations do not correct an earlier sample again, nor what ties it to others.
-        compare_earlier(a, b, newest_ - 1);
+        for (int sample = newest_ - 1; sample >= std::max(0, newest_ - 3); --sample) {
+          if (is_kept(a, b, sample)) {
+            compare(a, b, sample, true);
+          } else {
+            // Later observations do not correct it again, nor what ties it to others.
+            compare_earlier(a, b, sample);
+          }
+        }
       }
     }
   }
@@ -201,6 +210,22 @@ class Robot {
   [[nodiscard]] int earlier() {
     if (sightings_ == Sightings::kInOrder) return ahead_ ? newest_ : newest_ - 1;
     return std::max(0, newest_ - 1 - static_cast<int>(random_.index(4)));
+  }
+
+  // Whether the pair has what the filter has at an earlier sample: if of its edges only the base
+  // moves, which drifts and was observed then, or before and after.
+  [[nodiscard]] bool is_kept(const std::string& a, const std::string& b, int sample) const {
+    if (sightings_ != Sightings::kInOrder) return false;
+    const std::size_t kept = std::min(seen_.size(), kFewestRows + 1);
+    if (kept == 0 || sample < *std::prev(seen_.end(), static_cast<std::ptrdiff_t>(kept)))
+      return false;
+    const auto moves = [&](std::string frame) {
+      for (; !frame.empty(); frame = parents_.at(frame)) {
+        if (frame == "head" || frame == "tool") return true;
+      }
+      return false;
+    };
+    return !moves(a) && !moves(b);
   }
 
   // Whether it is what the filter has, or, unless that is `exact`, nowhere more certain.
@@ -300,7 +325,9 @@ class Robot {
     const auto observed = client_->observe(a, b, {X_AB->pose, R}, stamp(sample));
     if (!observed) FAIL(observed.error().message);
     poses_.clear();
-    filter_.observe(path(a, b, sample), R);
+    const auto edges = path(a, b, sample);
+    if (edges.count(row("base", sample)) > 0) seen_.insert(sample);
+    filter_.observe(edges, R);
     if (sightings_ == Sightings::kInOrder || sample == newest_) {
       compare(a, b, sample, sightings_ == Sightings::kInOrder);
     }
@@ -349,6 +376,7 @@ class Robot {
   std::map<std::pair<std::string, int>, Pose> poses_;  // that are known since the last change
   Pose G_;
   int newest_ = -1;     // sample
+  std::set<int> seen_;  // samples of the base
   bool ahead_ = false;  // an observation has corrected the newest sample of the base, but no other
   std::size_t frames_ = 0;
   std::string told_;
