@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/acting_thread.hpp"
 #include "base/log.hpp"
 #include "base/mutex.hpp"
 #include "base/thread_name.hpp"
@@ -86,7 +87,7 @@ void Callbacks::Line::close() {
   Lock lock(state_->mutex);
   waiting_->closed = true;
   dropped.swap(waiting_->calls);
-  if (waiting_->runner != std::this_thread::get_id()) {
+  if (waiting_->runner != acting_thread()) {
     state_->ended.wait(lock,
                        [this]() TFDUDE_REQUIRES(state_->mutex) { return !waiting_->running; });
   }
@@ -152,7 +153,7 @@ bool Callbacks::State::run_first() {
   Call call = std::move(waiting.calls.front());
   waiting.calls.pop_front();
   waiting.running = true;
-  waiting.runner = std::this_thread::get_id();
+  waiting.runner = acting_thread();
   moved = Clock::now();
   --idle;
   const bool looks = must_look();
@@ -179,7 +180,7 @@ bool Callbacks::State::run_first() {
   }
   if (idle == 1 || (!due.empty() && due.begin()->first <= now)) return true;
   --idle;
-  const auto self = threads.find(std::this_thread::get_id());
+  const auto self = threads.find(acting_thread());
   left.push_back(std::move(self->second));
   threads.erase(self);
   return false;
@@ -229,7 +230,7 @@ void Callbacks::stop() {
   state_->changed.notify_all();
   dropped.clear();
   for (auto& [id, thread] : threads) {
-    if (id == std::this_thread::get_id()) {
+    if (id == acting_thread()) {
       thread.detach();  // it ends with the call that calls this
     } else {
       thread.join();

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/acting_thread.hpp"
 #include "base/mutex.hpp"
 
 namespace tfdude {
@@ -59,7 +60,7 @@ void Events::unsubscribe(std::uint64_t subscriber) {
     dropped = std::move(found->second);
     state_->subscribers.erase(found);
   }
-  if (state_->teller != std::this_thread::get_id()) {
+  if (state_->teller != acting_thread()) {
     state_->told.wait(
         lock, [&]() TFDUDE_REQUIRES(state_->mutex) { return state_->running != subscriber; });
   }
@@ -108,7 +109,7 @@ std::optional<Waiting> Events::State::next() {
 
 void Events::State::report() {
   const Lock lock(mutex);
-  teller = std::this_thread::get_id();
+  teller = acting_thread();
   while (const auto one = next()) report(*one);
   reporting = false;
   teller = {};

@@ -7,6 +7,7 @@
 
 #include "base/log.hpp"
 #include "base/stamp.hpp"
+#include "runtime/open_participants.hpp"
 
 namespace tfdude {
 namespace {
@@ -80,7 +81,22 @@ Reply Participant::answer_own(const Request& request) {
   return reply ? *std::move(reply) : member_.answer(request);
 }
 
+Result<void> Participant::start() {
+  auto started = transport_->start(*this);
+  note_open(*this);
+  return started;
+}
+
 Participant::~Participant() {
+  note_ended(*this);
+  end();
+}
+
+void Participant::end() {
+  std::call_once(ended_, [this] { stop(); });
+}
+
+void Participant::stop() {
   // Callbacks may use all other parts, but wait no longer.
   lookups_.stop();
   watches_.end_waits();

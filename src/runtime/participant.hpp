@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,7 +50,11 @@ class Participant final : public TransportHandler,
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  [[nodiscard]] Result<void> start() { return transport_->start(*this); }
+  [[nodiscard]] Result<void> start();
+
+  /// Stops all threads and leaves the network, as the destructor does: at exit. Then no function
+  /// may be called.
+  void end();
 
   /// Makes this participant the owner of its partition. @return as Serving::serve()
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);
@@ -143,6 +148,7 @@ class Participant final : public TransportHandler,
     return member_.check_owns_partition();
   }
 
+  void stop();
   [[nodiscard]] std::optional<Requests::Follow> follow();
   /// Others have committed something. @return when to call again
   [[nodiscard]] Loop::Clock::time_point look_in_memory();
@@ -178,6 +184,7 @@ class Participant final : public TransportHandler,
   Descriptions descriptions_;
   Advances advances_;
   std::atomic<std::uint64_t> jumps_{0};  // of the clock
+  std::once_flag ended_;
   Streams streams_;
 };
 
