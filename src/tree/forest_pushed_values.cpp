@@ -125,7 +125,6 @@ class Telling {
   void tell(const Sample& sample);
   void tell_row(std::int64_t stamp, const Transform& X, const Correlation& row);
   void tell_newest();
-  void repeat_for_said();
 
   const HeldVersion& edge_;
   std::uint32_t index_;
@@ -205,28 +204,10 @@ void Telling::tell_no_sample(std::uint64_t seen) {
   values_.back().cleared = !edge_.unsampled();
 }
 
-// What is said of the edge is told with a sample that no observation has corrected. If there is
-// none, the one before is told again: what is said may be news, and all earlier samples err by it.
-void Telling::repeat_for_said() {
-  const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
-  if (!std::all_of(begin, values_.end(), is_of_sample) || correlation_of(edge_).empty()) return;
-  const SampleHistory& samples = *edge_.samples;
-  for (std::uint64_t number = edge_.number; number > samples.oldest();) {
-    const Sample* const sample = samples.sample(--number);
-    if (sample == nullptr) return;
-    if (time_of(sample->stamp) >= *begin->stamp || is_correlated(*sample)) continue;
-    tell(time_of(sample->stamp), value_of(edge_, *sample));
-    const auto first = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
-    std::rotate(first, values_.end() - 1, values_.end());
-    return;
-  }
-}
-
 void Telling::finish(bool begins) {
   if (values_.size() == begin_) return;
-  sort_by_stamp(values_.begin() + static_cast<std::ptrdiff_t>(begin_), values_.end());
-  repeat_for_said();
   const auto begin = values_.begin() + static_cast<std::ptrdiff_t>(begin_);
+  sort_by_stamp(begin, values_.end());
   const auto end = std::make_reverse_iterator(begin);
   const auto last = std::find_if_not(values_.rbegin(), end, is_of_sample);
   if (last != end) last->correlation = correlation_of(edge_);

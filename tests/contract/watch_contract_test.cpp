@@ -393,41 +393,4 @@ TEST_CASE("watch: a path that was just observed is as certain as a lookup says")
   }
 }
 
-TEST_CASE("watch: a source that is declared before an observation counts for earlier samples") {
-  const Join join = testing::join_loopback();
-  const auto sigma = [](double size) {
-    return *Covariance::from_stddev({size, size, size, size, size, size});
-  };
-  const Transform near{along_x(1).pose, sigma(0.01)};
-  auto node = Node::open(join("base"), "base",
-                         {{"world", "", {}}, {"cart", "world", near}, {"cup", "cart", near}})
-                  .value();
-  auto client = Client::open(join("")).value();
-  const auto watch = client.watch("world", "cart").value();
-  for (const int k : {1, 2})
-    REQUIRE(node.update("cart", {along_x(k).pose, sigma(0.01)}, ms(100 * k)));
-  CommonError heat{"heat", false, {}};
-  heat.loading = Twist::Unit(0) * 0.02;
-  const bool observed_first = GENERATE(false, true);
-  const auto observe = [&] {
-    REQUIRE(node.observe("world", "cup", {along_x(3).pose, sigma(0.003)}, ms(200))->accepted);
-  };
-  if (observed_first) observe();
-  REQUIRE(node.correlate("cart", {false, {heat}, {}}));
-  if (!observed_first) observe();
-  for (const int t : {100, 150, 200}) {
-    Query query;
-    query.at = ms(t);
-    const auto expected = node.lookup("world", "cart", query).value();
-    std::string difference;
-    const bool same = eventually([&] {
-      const auto X = watch.lookup(query);
-      difference = X ? testing::transform_diff(*X, expected, 1e-9) : X.error().message;
-      return difference.empty() && X->basis.sources == expected.basis.sources;
-    });
-    INFO("at " << t << ": " << difference);
-    CHECK(same);
-  }
-}
-
 }  // namespace tfdude
