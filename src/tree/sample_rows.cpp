@@ -60,10 +60,10 @@ bool is_long_ago(const HeldVersion& edge, const Sample& row) {
 }
 
 // How many rows are kept, besides one that an observation adds. They leave room for all edges that
-// it was observed with.
+// it was observed with, each of which may have as many.
 std::size_t kept_rows(const HeldVersion& edge, const std::vector<const Sample*>& rows) {
   const std::size_t together = partners_of(edge, *rows.front()).size() + 1;
-  const std::size_t room = kMaxObservedTogether - std::min(together, kMaxObservedTogether);
+  const std::size_t room = kMaxObservedTogether / 2 / together;
   const std::size_t most = std::min({rows.size(), kFewestRows, room});
   std::size_t recent = 0;
   while (recent < most && !is_long_ago(edge, *rows[recent])) ++recent;
