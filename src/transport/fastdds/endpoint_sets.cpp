@@ -51,7 +51,7 @@ EndpointSets::Known& EndpointSets::known(const PeerId& peer) {
 
 void EndpointSets::found(const PeerId& peer) {
   const Lock lock(mutex_);
-  known(peer).anew = false;
+  (void)known(peer);
 }
 
 void EndpointSets::found(const PeerId& peer, const Entity& endpoint, std::uint64_t settings) {

@@ -30,13 +30,14 @@ class EndpointSets {
   using Clock = std::chrono::steady_clock;
   using Entity = std::array<std::uint8_t, 4>;
 
-  /// For so long the difference must stay the same, if something was lost here since both agreed:
-  /// two announcements. Copies of one that come another way do not count as two.
-  static constexpr std::chrono::milliseconds kAfterLoss{200};
-  /// Otherwise. Fast DDS repeats what was lost on the way within a second.
+  /// For so long the difference must stay the same, if something was lost here since both agreed.
+  /// Within it Fast DDS repeats an endpoint that replaces the lost one, if its message was lost on
+  /// the way.
+  static constexpr std::chrono::milliseconds kAfterLoss{1200};
+  /// Otherwise.
   static constexpr std::chrono::milliseconds kOtherwise{3000};
-  /// Each discovery in vain doubles them, up to this factor; who agrees for kTrustedAfter has them
-  /// as before.
+  /// Each discovery doubles them, up to this factor; who agrees for kTrustedAfter has them as
+  /// before.
   static constexpr int kMostPatient = 64;
   static constexpr std::chrono::seconds kTrustedAfter{10};
   /// Of those lost since both agreed.
