@@ -174,15 +174,17 @@ class MessageFilter(Generic[Message]):
 
     def _next(self) -> tuple[Message, _core.StampedTransform] | None:
         self._collect()
-        while self._dropped:
-            entry = self._dropped.popleft()
+        while (entry := self._first(self._dropped)) is not None:
             assert isinstance(entry.answer, _errors.TransformException) and self._on_dropped is not None
             self._on_dropped(entry.message, entry.answer)
-        if not self._ready:
+        if (entry := self._first(self._ready)) is None:
             return None
-        entry = self._ready.popleft()
         assert isinstance(entry.answer, _core.StampedTransform)
         return entry.message, entry.answer
+
+    def _first(self, of: collections.deque[_Waiting[Message]]) -> _Waiting[Message] | None:
+        with self._collecting:
+            return of.popleft() if of else None
 
 
 def filter_messages(
