@@ -1,5 +1,6 @@
 #include "runtime/open_participants.hpp"
 
+#include <cstdlib>
 #include <mutex>
 #include <set>
 #include <system_error>
@@ -7,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/acting_thread.hpp"
+#include "base/log.hpp"
 #include "runtime/participant.hpp"
 
 namespace tfdude {
@@ -15,7 +17,8 @@ namespace {
 struct OpenParticipants {
   std::mutex mutex;
   std::set<Participant*> all;
-  pid_t process = getpid();
+  pid_t process = 0;  // whose they are
+  int registered = 0;
 };
 
 // Never destroyed: participants may end after all else.
@@ -24,43 +27,42 @@ OpenParticipants& open_participants() {
   return *known;
 }
 
-struct AtExit {
-  AtExit() = default;
-  AtExit(const AtExit&) = delete;
-  AtExit& operator=(const AtExit&) = delete;
-  ~AtExit() {
-    OpenParticipants& known = open_participants();
-    if (known.process != getpid()) return;
-    // By a thread whose own variables are not destroyed yet, as those of this one may be.
-    try {
-      std::thread([&known, exiting = std::this_thread::get_id()] {
-        act_for(exiting);
-        end_all(known);
-      }).join();
-    } catch (const std::system_error&) {
-      // Without another thread, what is open goes on until the process is gone.
-    }
-  }
+Participant* taken(OpenParticipants& known) {
+  const std::lock_guard<std::mutex> lock(known.mutex);
+  return known.all.empty() ? nullptr : known.all.extract(known.all.begin()).value();
+}
 
- private:
-  // Without the lock: it waits for functions of the program, which may open or end others.
-  static void end_all(OpenParticipants& known) {
-    while (Participant* const participant = taken(known)) participant->end();
-  }
-  static Participant* taken(OpenParticipants& known) {
+void end_all() {
+  OpenParticipants& known = open_participants();
+  {
     const std::lock_guard<std::mutex> lock(known.mutex);
-    return known.all.empty() ? nullptr : known.all.extract(known.all.begin()).value();
+    if (known.all.empty() || known.process != getpid()) return;
   }
-};
+  // By a thread whose own variables are not destroyed yet, as those of this one may be.
+  try {
+    std::thread([&known, exiting = std::this_thread::get_id()] {
+      act_for(exiting);
+      // Without the lock: it waits for functions of the program, which may open or end others.
+      while (Participant* const participant = taken(known)) participant->end();
+    }).join();
+  } catch (const std::system_error&) {
+    // Without another thread, what is open goes on until the process is gone.
+  }
+}
+
+// What was made before it was registered is destroyed after it has run: a later participant may be
+// the first that needs Fast DDS, or keys. It cannot be registered for each of any number.
+constexpr int kMostRegistered = 64;
 
 }  // namespace
 
 void note_open(Participant& participant) {
+  (void)log();
   OpenParticipants& known = open_participants();
-  // What was made before it is destroyed after it.
-  static const AtExit at_exit;
   const std::lock_guard<std::mutex> lock(known.mutex);
+  if (known.all.empty()) known.process = getpid();
   known.all.insert(&participant);
+  if (known.registered < kMostRegistered && std::atexit(&end_all) == 0) ++known.registered;
 }
 
 void note_ended(Participant& participant) {

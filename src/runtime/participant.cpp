@@ -83,7 +83,7 @@ Reply Participant::answer_own(const Request& request) {
 
 Result<void> Participant::start() {
   auto started = transport_->start(*this);
-  note_open(*this);
+  if (started) note_open(*this);
   return started;
 }
 

@@ -26,7 +26,7 @@ std::string mismatch_of(const std::string& topic, edds::QosPolicyId_t policy) {
 
 void log_mismatch(const std::string& mismatch) {
   static Mutex mutex;
-  static std::set<std::string> logged;
+  static auto& logged = *new std::set<std::string>;  // not destroyed: threads may outlive it
   const Lock lock(mutex);
   if (logged.insert(mismatch).second) log().error("{}", mismatch);
 }

@@ -44,7 +44,8 @@ Mutex& loading() {
 // text is loaded once, and an edited file is loaded again.
 // @return the ending of their names
 Result<std::string> make_known(const std::string& xml) TFDUDE_REQUIRES(loading()) {
-  static std::map<std::string, std::string> known;  // endings
+  // Endings. Not destroyed: threads may outlive it.
+  static auto& known = *new std::map<std::string, std::string>;
   if (const auto before = known.find(xml); before != known.end()) return before->second;
   std::string ending = "@tfdude-" + std::to_string(known.size());
   const auto own = with_own_names(xml, ending);
@@ -64,7 +65,8 @@ constexpr auto kMemoryPolicy = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
 // for each duration in it. All of them took half of the processor time of a short command.
 // @return the ending of its name
 Result<std::string> make_builtin_known(const std::string& name) TFDUDE_REQUIRES(loading()) {
-  static std::map<std::string, std::string> known;  // endings
+  // Endings. Not destroyed: threads may outlive it.
+  static auto& known = *new std::map<std::string, std::string>;
   if (const auto before = known.find(name); before != known.end()) return before->second;
   auto ending = make_known(only_profile(builtin_text(kBuiltinProfiles), name));
   if (ending) known.emplace(name, *ending);
