@@ -13,6 +13,7 @@
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/client/watch.hpp"
+#include "tfdude/transport/loopback.hpp"
 
 namespace {
 
@@ -31,6 +32,15 @@ int main(int count, char** arguments) {
   options.domain = static_cast<std::uint32_t>(std::atoi(arguments[1]));
   options.profile = arguments[2];
   const std::string how = arguments[3];
+  LoopbackNetwork network;
+  std::optional<Result<Node>> before;
+  if (how == "after loopback")
+    before.emplace(Node::open(network.join(), "alone", {{"lamp", "", {}}}));
+  if (how == "after an error") {
+    ClientOptions wrong = options;
+    wrong.profile = "/nowhere/profile.xml";
+    if (Client::open(wrong)) return 8;
+  }
   Result<Client> opened = Client::open(options);
   if (!opened) return 3;
   if (!opened->lookup("world", "robot_1", Query{}, Milliseconds(20000))) return 4;
@@ -41,7 +51,7 @@ int main(int count, char** arguments) {
     std::this_thread::sleep_for(std::chrono::seconds(20));
     return 5;
   }
-  if (how == "optional") global.emplace(*std::move(opened));
+  if (how == "optional" || how.rfind("after", 0) == 0) global.emplace(*std::move(opened));
   if (how == "unique") owned = std::make_unique<Client>(*std::move(opened));
   if (how == "watch") {
     auto watched = opened->watch("world", "robot_1", {}, Milliseconds(20000));

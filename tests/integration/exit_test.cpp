@@ -10,8 +10,8 @@ namespace tfdude {
 TEST_CASE("exit: clients and nodes that are still open end with the process") {
   const testing::TestDomain domain;
   const testing::Process robot = domain.serve(testing::kRobotFile);
-  const std::string how =
-      GENERATE("exit", "exit in a callback", "optional", "unique", "watch", "node");
+  const std::string how = GENERATE("exit", "exit in a callback", "optional", "unique", "watch",
+                                   "node", "after loopback", "after an error");
   INFO(how);
   testing::Process program(
       {TFDUDE_EXIT_NODE, std::to_string(domain.number()), TFDUDE_LOOPBACK_PROFILE, how});
