@@ -1,7 +1,9 @@
 #include "transport/fastdds/contact.hpp"
 
+#include <algorithm>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace tfdude::fastdds {
@@ -13,13 +15,19 @@ constexpr std::chrono::milliseconds kRepeatEvery{800};
 // The number of servers that this one hears changes often just when there is most to do.
 constexpr std::chrono::milliseconds kCountEvery{200};
 
+// Of a server that is gone without anybody missing it, such as an earlier process of a partition.
+constexpr std::chrono::seconds kUncountedWithin{1};
+
 }  // namespace
 
 void Contact::announce(Writer& writer, const Presence& presence) {
   const Lock lock(mutex_);
   writer_ = &writer;
-  said_ = to_wire(presence);
-  say(peers_.heard_count());
+  wire::Presence next = to_wire(presence);
+  const bool same_missed = said_ && said_->absent() == next.absent();
+  next.peers(same_missed ? said_->peers() : 0);
+  said_ = std::move(next);
+  say(std::max(said_->peers(), peers_.heard_count()));
 }
 
 std::chrono::milliseconds Contact::look() {
@@ -34,15 +42,20 @@ std::chrono::milliseconds Contact::look() {
   return next_look_;
 }
 
-// A new participant knows by this number whether it has discovered all.
+// A new participant knows by this number whether it has discovered all, or heard who is missed. So
+// who is gone counts until it is announced as missed.
 // @return false if others must be told later
 bool Contact::announce_count() {
   const auto heard = peers_.heard_count();
   const Lock lock(mutex_);
   if (!said_) return true;
-  const auto age = Peers::Clock::now() - said_at_;
+  const auto now = Peers::Clock::now();
+  const auto age = now - said_at_;
+  const bool fewer = heard < said_->peers();
+  if (!fewer) all_heard_at_ = now;
   const bool changed = said_->peers() != heard;
   if (changed && age < kCountEvery) return false;
+  if (fewer && now - all_heard_at_ < kUncountedWithin) return false;
   if (changed || (repeats_ && age >= kRepeatEvery)) say(heard);
   return true;
 }

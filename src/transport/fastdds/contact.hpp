@@ -45,6 +45,8 @@ class Contact {
   std::optional<wire::Presence> said_ TFDUDE_GUARDED_BY(mutex_);
   Writer* writer_ TFDUDE_GUARDED_BY(mutex_) = nullptr;
   Peers::Clock::time_point said_at_ TFDUDE_GUARDED_BY(mutex_);
+  // When as many were heard as was announced.
+  Peers::Clock::time_point all_heard_at_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds
