@@ -1,10 +1,11 @@
 #include "transport/fastdds/contact.hpp"
 
-#include <algorithm>
 #include <set>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
+
+#include "transport/fastdds/field_kinds.hpp"
 
 namespace tfdude::fastdds {
 namespace {
@@ -15,19 +16,13 @@ constexpr std::chrono::milliseconds kRepeatEvery{800};
 // The number of servers that this one hears changes often just when there is most to do.
 constexpr std::chrono::milliseconds kCountEvery{200};
 
-// Of a server that is gone without anybody missing it, such as an earlier process of a partition.
-constexpr std::chrono::seconds kUncountedWithin{1};
-
 }  // namespace
 
 void Contact::announce(Writer& writer, const Presence& presence) {
   const Lock lock(mutex_);
   writer_ = &writer;
-  wire::Presence next = to_wire(presence);
-  const bool same_missed = said_ && said_->absent() == next.absent();
-  next.peers(same_missed ? said_->peers() : 0);
-  said_ = std::move(next);
-  say(std::max(said_->peers(), peers_.heard_count()));
+  said_ = to_wire(presence);
+  say(count());
 }
 
 std::chrono::milliseconds Contact::look() {
@@ -42,20 +37,21 @@ std::chrono::milliseconds Contact::look() {
   return next_look_;
 }
 
-// A new participant knows by this number whether it has discovered all, or heard who is missed. So
-// who is gone counts until it is announced as missed.
+// A new participant knows by this number whether it has discovered all, or heard who is missed.
+std::uint32_t Contact::count() {
+  std::set<std::string_view> missed;
+  for (const auto& one : said_->absent()) missed.insert(text(one.partition()));
+  return peers_.count(missed);
+}
+
 // @return false if others must be told later
 bool Contact::announce_count() {
-  const auto heard = peers_.heard_count();
   const Lock lock(mutex_);
   if (!said_) return true;
-  const auto now = Peers::Clock::now();
-  const auto age = now - said_at_;
-  const bool fewer = heard < said_->peers();
-  if (!fewer) all_heard_at_ = now;
+  const auto heard = count();
+  const auto age = Peers::Clock::now() - said_at_;
   const bool changed = said_->peers() != heard;
   if (changed && age < kCountEvery) return false;
-  if (fewer && now - all_heard_at_ < kUncountedWithin) return false;
   if (changed || (repeats_ && age >= kRepeatEvery)) say(heard);
   return true;
 }

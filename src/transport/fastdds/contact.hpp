@@ -33,6 +33,7 @@ class Contact {
  private:
   bool announce_count();
   void say(std::uint32_t heard) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] std::uint32_t count() TFDUDE_REQUIRES(mutex_);
 
   Peers& peers_;
   Attention& attention_;
@@ -45,8 +46,6 @@ class Contact {
   std::optional<wire::Presence> said_ TFDUDE_GUARDED_BY(mutex_);
   Writer* writer_ TFDUDE_GUARDED_BY(mutex_) = nullptr;
   Peers::Clock::time_point said_at_ TFDUDE_GUARDED_BY(mutex_);
-  // When as many were heard as was announced.
-  Peers::Clock::time_point all_heard_at_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds

@@ -1,6 +1,7 @@
 #include "transport/fastdds/peers.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "base/log.hpp"
 #include "base/mutex.hpp"
@@ -10,6 +11,8 @@ namespace {
 
 // Of participants that speak another major version.
 constexpr std::size_t kMostLogged = 256;
+// Anybody can announce any number of partitions, and leave.
+constexpr std::size_t kMostUntold = 256;
 
 }  // namespace
 
@@ -122,8 +125,10 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   if (known == servers_.end()) return;
   life_signs_->forget(known->first);
   const Server& server = known->second;
-  if (server.said() != nullptr && !server.silent) gone_(*server.said(), {});
+  const bool is_news = server.said() != nullptr && !server.silent;
+  const Presence said = is_news ? *server.said() : Presence();
   servers_.erase(known);
+  if (is_news) lose(said, {});
   note_doubts();
   any_overtaken_ = std::any_of(servers_.begin(), servers_.end(),
                                [](const auto& one) { return one.second.overtaken; });
@@ -193,7 +198,7 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
     if (silence.kind != Silence::Kind::kLost) continue;
     server.silent = true;
     server.doubted_since.reset();
-    gone_(*said, silence.early);
+    lose(*said, silence.early);
   }
   note_doubts();
   if (ask_rivals) unheard.push_back(own_);
@@ -208,11 +213,33 @@ bool Peers::discovered() const {
   return Clock::now() - last_met_ >= (least == 0 ? kAgreedQuiet : kQuiet);
 }
 
-std::uint32_t Peers::heard_count() const {
+bool Peers::is_heard(const std::string& partition) const {
+  return std::any_of(servers_.begin(), servers_.end(), [&](const auto& known) {
+    const Server& server = known.second;
+    return server.presence && !server.silent && server.presence->partition == partition;
+  });
+}
+
+void Peers::lose(const Presence& said, Clock::duration early) {
+  if (!is_heard(said.partition) && untold_.size() < kMostUntold) {
+    untold_[said.partition] = Clock::now();
+  }
+  gone_(said, early);
+}
+
+std::uint32_t Peers::count(const std::set<std::string_view>& missed) {
   const Lock lock(mutex_);
-  return static_cast<std::uint32_t>(std::count_if(
-      servers_.begin(), servers_.end(),
-      [](const auto& server) { return server.second.presence && !server.second.silent; }));
+  const auto now = Clock::now();
+  for (auto one = untold_.begin(); one != untold_.end();) {
+    const auto& [partition, since] = *one;
+    const bool is_told =
+        missed.count(partition) != 0 || is_heard(partition) || now - since > kToldWithin;
+    one = is_told ? untold_.erase(one) : std::next(one);
+  }
+  const auto heard = std::count_if(servers_.begin(), servers_.end(), [](const auto& server) {
+    return server.second.presence && !server.second.silent;
+  });
+  return static_cast<std::uint32_t>(heard) + static_cast<std::uint32_t>(untold_.size());
 }
 
 bool Peers::silent(const std::string& partition) const {

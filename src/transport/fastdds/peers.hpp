@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -58,6 +59,8 @@ class Peers {
   /// The same if all servers hear exactly those that were discovered here.
   static constexpr std::chrono::milliseconds kAgreedQuiet{40};
 
+  /// A loss is announced within this time, or will not be.
+  static constexpr std::chrono::seconds kToldWithin{1};
   /// A rival answers within this time, or is not believed.
   static constexpr std::chrono::seconds kProofWithin{1};
   /// For another process to take the partition, this one must have been silent for longer
@@ -112,8 +115,10 @@ class Peers {
   /// Whether messages of this participant cannot be understood. O(1) while there is none such.
   [[nodiscard]] bool is_incompatible(const ertps::GuidPrefix_t& prefix) const;
 
-  /// How many servers are heard.
-  [[nodiscard]] std::uint32_t heard_count() const;
+  /// How many servers are heard, or are gone without being announced as missed yet: whoever starts
+  /// now would otherwise take what the others have for all there is.
+  /// @param missed  the partitions that this participant announces as missed
+  [[nodiscard]] std::uint32_t count(const std::set<std::string_view>& missed);
 
   /// Whether the server of this partition is silent.
   [[nodiscard]] bool silent(const std::string& partition) const;
@@ -169,6 +174,9 @@ class Peers {
   /// Reports a rival that did not answer in time as gone. @return whether one must be asked
   bool ask_rival(Server& server, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
   void note_doubts() TFDUDE_REQUIRES(mutex_);
+  /// Reports that the server of this presence has left or is silent.
+  void lose(const Presence& said, Clock::duration early) TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] bool is_heard(const std::string& partition) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
   /// Whether all that this client hears is who only claims a partition yet.
   [[nodiscard]] bool is_about_to_be_served() const TFDUDE_REQUIRES(mutex_);
@@ -183,6 +191,8 @@ class Peers {
   std::map<PeerId, Server> servers_ TFDUDE_GUARDED_BY(mutex_);
   std::map<PeerId, IncompatiblePeer> incompatible_ TFDUDE_GUARDED_BY(mutex_);
   std::set<std::string> logged_ TFDUDE_GUARDED_BY(mutex_);  // of these
+  // Partitions whose loss was reported, and when: they count until they are announced as missed.
+  std::map<std::string, Clock::time_point, std::less<>> untold_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<bool> any_incompatible_{false};
   std::atomic<bool> any_overtaken_{false};
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};

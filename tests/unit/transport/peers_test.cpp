@@ -267,6 +267,38 @@ TEST_CASE("servers count also the participant that asks") {
   CHECK(beside.peers.discovered());
 }
 
+TEST_CASE("a server that is gone counts until it is announced as missed") {
+  Observer one(true);
+  one.meet(1, "arms");
+  one.meet(2, "head");
+  CHECK(one.peers.count({}) == 2);
+  SECTION("who has left") {
+    one.peers.left(prefix_of(1));
+    CHECK(one.peers.count({"head"}) == 2);
+    CHECK(one.peers.count({"arms"}) == 1);
+    CHECK(one.peers.count({}) == 1);  // it has returned, and was another process
+  }
+  SECTION("who is silent, and is heard again") {
+    one.look(std::chrono::milliseconds(1900));
+    hear(*one.signs, 2, one.now);
+    one.look(std::chrono::milliseconds(200));
+    REQUIRE(one.peers.silent("arms"));
+    CHECK(one.peers.count({}) == 2);
+    hear(*one.signs, 1, one.now);
+    one.look(std::chrono::milliseconds(30));
+    CHECK(one.peers.count({}) == 2);
+  }
+  SECTION("who ends in order is announced before it leaves") {
+    one.peers.left(prefix_of(2));
+    CHECK(one.peers.count({"head"}) == 1);
+  }
+  SECTION("an earlier process of a partition is missed by nobody") {
+    one.meet(3, "arms");
+    one.peers.left(prefix_of(1));
+    CHECK(one.peers.count({}) == 2);
+  }
+}
+
 TEST_CASE("a server that is not needed counts as lost without announcements") {
   Observer one;
   one.meet(1, "arms");
