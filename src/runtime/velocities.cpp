@@ -1,83 +1,32 @@
 #include "runtime/velocities.hpp"
 
 #include <algorithm>
-#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "base/saturating.hpp"
 #include "base/stamp.hpp"
-#include "calls/lookup_in_progress.hpp"
+#include "calls/two_reads_task.hpp"
 #include "math/mean_velocity.hpp"
-#include "partition/observing.hpp"
 
 namespace tfdude {
 namespace {
 
-// The same requests at another instant.
-std::vector<Part> parts_at(const std::vector<Part>& parts, Time at) {
-  std::vector<Part> then = parts;
-  for (Part& part : then) {
-    auto& request = std::get<LookupRequest>(part.request.body);
-    request.query.at = at;
-    request.timed = true;
+std::vector<EdgeAtEnds> edges_of(const TwoReadsTask& task) {
+  std::vector<EdgeAtEnds> edges;
+  const ObservedPath& before = task.path(0);
+  const ObservedPath& after = task.path(1);
+  const auto& planned = task.planned(0).edges;
+  for (std::size_t k = 0; k < planned.size(); ++k) {
+    const std::string& id = planned[k].info.id;
+    const bool moves =
+        is_moving(id, before.correlations[k]) || is_moving(id, after.correlations[k]);
+    const bool drifts =
+        is_drifting(id, before.correlations[k]) && is_drifting(id, after.correlations[k]);
+    edges.push_back({before.edges[k].X_PC, after.edges[k].X_PC, planned[k].way, !moves, drifts});
   }
-  return then;
+  return edges;
 }
-
-// Asks for the edges of a path at both ends of an interval. The answers tell which of them are
-// dynamic.
-class EdgesTask final : public Task {
- public:
-  EdgesTask(const Forest& forest, std::string a, std::string b, Time begin, Time end)
-      : forest_(forest), a_(std::move(a)), b_(std::move(b)), begin_(begin), end_(end) {}
-
-  [[nodiscard]] std::vector<std::string> frames() const override { return {a_, b_}; }
-  [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point) override {
-    auto planned = route_observe(forest_, directory, a_, b_, {}, begin_);
-    if (!planned) return tl::unexpected(std::move(planned.error()));
-    plan_ = *std::move(planned);
-    edges_.clear();
-    parts_ = parts_at(plan_.parts, begin_);
-    std::vector<Part> then = parts_at(plan_.parts, end_);
-    std::move(then.begin(), then.end(), std::back_inserter(parts_));
-    return {};
-  }
-  [[nodiscard]] std::vector<Part>& parts() override { return parts_; }
-  [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point) override {
-    auto answers = values_of(std::move(replies));
-    if (!answers) return tl::unexpected(std::move(answers.error()));
-    const auto middle = answers->begin() + static_cast<std::ptrdiff_t>(plan_.parts.size());
-    const auto before = observed_path(plan_, {answers->begin(), middle});
-    if (!before) return tl::unexpected(before.error());
-    const auto after = observed_path(plan_, {middle, answers->end()});
-    if (!after) return tl::unexpected(after.error());
-    for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
-      const std::string& id = plan_.edges[k].info.id;
-      const bool moves =
-          is_moving(id, before->correlations[k]) || is_moving(id, after->correlations[k]);
-      const bool drifts =
-          is_drifting(id, before->correlations[k]) && is_drifting(id, after->correlations[k]);
-      edges_.push_back(
-          {before->edges[k].X_PC, after->edges[k].X_PC, plan_.edges[k].way, !moves, drifts});
-    }
-    return Next::kDone;
-  }
-
-  /// Once it is done.
-  [[nodiscard]] const std::vector<EdgeAtEnds>& edges() const { return edges_; }
-  [[nodiscard]] const ObservePlan& planned() const { return plan_; }
-
- private:
-  const Forest& forest_;
-  const std::string a_;
-  const std::string b_;
-  const Time begin_;
-  const Time end_;
-  ObservePlan plan_;
-  std::vector<Part> parts_;
-  std::vector<EdgeAtEnds> edges_;
-};
 
 // Whether B turns by more than half a turn from the first instant over another one to the last:
 // then the shorter way between the first and the last pose is not the way that it took.
@@ -144,9 +93,10 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   const auto interval = this->interval(a, b, query, *newest->stamp, deadline);
   if (!interval) return tl::unexpected(interval.error());
   const Interval& ends = *interval;
-  EdgesTask task(structure_.forest, a, b, ends.begin, ends.end);
+  const auto read_at = [&](Time at) { return TwoReadsTask::Read{a, b, {at, {}, {}}}; };
+  TwoReadsTask task(structure_.forest, read_at(ends.begin), read_at(ends.end), true);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
-  const std::vector<EdgeAtEnds>& edges = task.edges();
+  const std::vector<EdgeAtEnds> edges = edges_of(task);
   const auto between = lookup(a, b, ends.begin + (ends.end - ends.begin) / 2, deadline);
   if (!between) return tl::unexpected(between.error());
   if (turns_too_far(edges, between->pose)) {
@@ -163,7 +113,7 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   velocity.basis.sources = std::move(mean.sources);
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!edges[k].before.unspecified && !edges[k].after.unspecified) continue;
-    velocity.basis.unspecified.push_back(task.planned().edges[k].info.id);
+    velocity.basis.unspecified.push_back(task.planned(0).edges[k].info.id);
   }
   velocity.covariance.set_complete(velocity.basis.unspecified.empty());
   return velocity;

@@ -351,6 +351,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     auto asked = asked_segments(Others{now}, *ends, query, hint);
     if (!asked) return tl::unexpected(std::move(asked.error()));
     values = *std::move(asked);
+    values.commit = now.commit();
     if (motion && !tell_motion(*ends, timed_since, now, values)) return not_readable();
     return {};
   };

@@ -155,6 +155,17 @@ class RemoteReading {
   }
   /// Whether anything was found since then.
   [[nodiscard]] bool used() const { return used_; }
+  /// At which commit the owner was read; 0: none was, or several.
+  [[nodiscard]] std::uint64_t commit() const {
+    std::uint64_t commit = 0;
+    for (std::size_t word = 0; word < taken_.size(); ++word) {
+      for (std::uint64_t left = taken_[word]; left != 0; left &= left - 1) {
+        if (commit != 0) return 0;
+        commit = owners_[64 * word + static_cast<std::size_t>(__builtin_ctzll(left))].commit;
+      }
+    }
+    return commit;
+  }
 
  private:
   // Of all edges together, as the time to add them up is that of their square.

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <unistd.h>
@@ -184,6 +185,40 @@ TEST_CASE("rewrite: who looks up or watches has one history or the other") {
   for (std::thread& reader : readers) reader.join();
   CHECK(torn == 0);
   CHECK(seen > 20);
+}
+
+TEST_CASE("rewrite: a velocity and a motion between two instants are of one history") {
+  Slam slam(joined_by(GENERATE(from_range(testing::networks()))));
+  const TimeInterval interval{ms(1000), ms(4000)};
+  REQUIRE(slam.node->rewrite("odom", interval, saying(0, 1000, 4000)));
+  REQUIRE(slam.node->update("fixed", along_x(1)));
+  std::atomic<bool> stop{false};
+  // The robot rests, each time elsewhere.
+  std::thread rewrites([&] {
+    for (int i = 1; !stop; ++i) {
+      (void)slam.node->rewrite("odom", interval, saying(i, 1000, 4000));
+    }
+  });
+  for (Client* client : {&*slam.client, static_cast<Client*>(&*slam.node)}) {
+    int moved = 0;
+    int seen = 0;
+    std::set<std::string> errors;
+    const auto until = std::chrono::steady_clock::now() + 400ms;
+    while (std::chrono::steady_clock::now() < until || seen == 0) {
+      const auto velocity = client->velocity("map", "odom", {ms(2500), 2000ms});
+      if (velocity && velocity->linear.x() != 0) ++moved;
+      const auto X = client->lookup("odom", query(1500), "odom", query(3500), "map");
+      if (X && X->pose.translation().x() != 0) ++moved;
+      seen += velocity && X ? 1 : 0;
+      if (!velocity) errors.insert(outcome(velocity));
+      if (!X) errors.insert(outcome(X));
+    }
+    errors.erase("changed_meanwhile");
+    CHECK(errors.empty());
+    CHECK(moved == 0);
+  }
+  stop = true;
+  rewrites.join();
 }
 
 TEST_CASE("rewrite: the last transform is shown, however early the past that was rewritten ends") {
