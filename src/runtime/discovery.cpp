@@ -29,7 +29,7 @@ Discovery::Discovery(Structure& structure, const Transport& transport, Milliseco
       told_by_(Deadline::sum(met_by_, Deadline::sum(timeout, Deadline::sum(timeout, timeout)))) {}
 
 bool Discovery::complete() {
-  if (complete_.load(std::memory_order_relaxed)) return true;
+  if (complete_.load(std::memory_order_relaxed) || ended_) return true;
   const auto now = Clock::now();
   const bool told = now >= told_by_;
   const bool met_all = told || transport_.discovered();
@@ -90,7 +90,12 @@ Result<void> Discovery::await_known(const Deadline& deadline) {
   return nobody_but_excluded();
 }
 
+Error Discovery::ended_error(const Error& error) const {
+  return {Errc::kTransport, "the client was closed: " + error.message, error.frame};
+}
+
 Result<void> Discovery::nobody_but_excluded() const {
+  if (ended_) return tl::unexpected(ended_error({Errc::kTimeout, "not all frames are known"}));
   const auto excluded = transport_.excluded();
   if (excluded.empty()) return {};
   const Lock lock(structure_.mutex);
@@ -120,6 +125,7 @@ void Discovery::wait_for_change(const Deadline& deadline) {
 }
 
 Error Discovery::explained(Error error) {
+  if (ended_) return ended_error(error);
   // Before the lock is taken: the transport has a lock of its own.
   if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
     return {Errc::kIncompatible,

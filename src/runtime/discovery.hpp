@@ -27,7 +27,7 @@ class Discovery {
             Milliseconds timeout);
 
   /// Whether everything that existed at the start, and all changes that owners have announced
-  /// since, are known.
+  /// since, are known; or the client ends, so that no more is learned.
   [[nodiscard]] bool complete();
 
   /// A change that an owner announced did not come in time: until it has, unknown frames may exist.
@@ -53,7 +53,8 @@ class Discovery {
 
   /// Waits until a partition of this name is known and reachable, or the client ends.
   void wait_for_partition(const std::string& name, const Deadline& deadline);
-  /// The client ends: nobody waits for a partition any more, or will. Takes effect within 50 ms.
+  /// The client ends: nobody waits here any more, or will; what is not known is kTransport. Takes
+  /// effect within 50 ms.
   void end_waits() { ended_ = true; }
 
   /// The final error of an operation that failed and is not repeated.
@@ -70,6 +71,7 @@ class Discovery {
 
  private:
   [[nodiscard]] Result<void> nobody_but_excluded() const;
+  [[nodiscard]] Error ended_error(const Error& error) const;
   [[nodiscard]] bool lacks_frames_only(Clock::time_point now, bool over);
 
   Structure& structure_;

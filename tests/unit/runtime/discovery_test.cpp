@@ -154,6 +154,27 @@ TEST_CASE("discovery: it waits for a change that an owner has announced but that
   CHECK(joiner.rig.discovery.await(Deadline(10s)));
 }
 
+TEST_CASE("discovery: the end of the client ends the waits, and says so") {
+  Options options = quick();
+  options.discovery = 60s;
+  Joiner joiner(options);
+  Result<void> all;
+  Result<int> found;
+  std::thread knows_all([&] { all = joiner.rig.discovery.await(Deadline(60s)); });
+  std::thread finds([&] {
+    found = joiner.rig.requests.find(Deadline(60s), [](const Directory&) { return missing(); });
+  });
+  joiner.rig.discovery.end_waits();
+  knows_all.join();
+  finds.join();
+  REQUIRE_FALSE(all);
+  CHECK(all.error().code == Errc::kTransport);
+  REQUIRE_FALSE(found);
+  CHECK(found.error().code == Errc::kTransport);
+  CHECK(found.error().message == "the client was closed: no frame 'hand'");
+  CHECK_FALSE(joiner.rig.discovery.await_known(Deadline(60s)));
+}
+
 TEST_CASE("discovery: a call may also take the rest of the discovery time") {
   Options options = quick();
   options.discovery = 10s;
