@@ -145,7 +145,9 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
     return tl::unexpected(std::move(ok.error()));
   }
   const Deadline deadline = discovery_.call_deadline();
-  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
+  if (auto known = discovery_.await_known(deadline); !known) {
+    return tl::unexpected(std::move(known.error()));
+  }
   if (!knows_all()) {
     auto all = frames(deadline);
     if (!all) return tl::unexpected(std::move(all.error()));
@@ -153,6 +155,10 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
     if (std::any_of(all->begin(), all->end(), is_it)) {
       return ids_of(*all, [&](const Frame& frame) { return frame.attached && frame.parent == id; });
     }
+  }
+  // The frame may be one of those that have not come yet.
+  if (!structure_.forest.exists(id)) {
+    if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
   }
   return structure_.forest.children(id);
 }
@@ -162,7 +168,9 @@ Result<std::vector<std::string>> Queries::roots() {
     return tl::unexpected(std::move(ok.error()));
   }
   const Deadline deadline = discovery_.call_deadline();
-  if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
+  if (auto known = discovery_.await_known(deadline); !known) {
+    return tl::unexpected(std::move(known.error()));
+  }
   if (knows_all()) return structure_.forest.roots();
   auto all = frames(deadline);
   if (!all) return tl::unexpected(std::move(all.error()));

@@ -113,6 +113,8 @@ TEST_CASE("frames that were announced and never come are missing from lists, whi
   const auto frames = client->frames();
   REQUIRE(frames);
   CHECK(frames->size() == 2);
+  CHECK(client->children("world").value() == std::vector<std::string>{"hand"});
+  CHECK(client->roots().value() == std::vector<std::string>{"world"});
   CHECK(client->remove("hand"));
   CHECK(eventually([&] { return !arm->exists("hand"); }));
 }
