@@ -1,6 +1,8 @@
 #include "calls/waiting_lookup.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <utility>
 
 namespace tfdude {
 namespace {
@@ -10,6 +12,9 @@ constexpr std::chrono::nanoseconds kAskSoonest = Milliseconds(1);
 constexpr std::chrono::nanoseconds kAskLatest = Milliseconds(50);
 // Minimum interval of requests, for all waiting lookups together.
 constexpr std::chrono::microseconds kAskEvery{250};
+// Owners are asked for the last time so long before the time limit, and longer for each that waits.
+constexpr std::chrono::nanoseconds kLastAsked = Milliseconds(10);
+constexpr std::chrono::microseconds kLastAskedEach{25};
 
 }  // namespace
 
@@ -93,7 +98,13 @@ WaitingLookup::Answer WaitingLookup::judge(const Shared& shared, const News& new
   if (limit_.over(now)) return Found(tl::unexpected(shared.host.last_word(last_, limit_)));
   far_ = far;
   // What plan() would find may have changed during the request, and the data may have come.
-  next_ = version_ != news.version ? now : next_attempt(shared, news, now);
+  const bool again = forward_ == Forward::kAfterThis || version_ != news.version;
+  if (forward_ == Forward::kAfterThis) {
+    forward_ = Forward::kNext;
+  } else {
+    forward_ = forward_ == Forward::kNext ? Forward::kInVain : Forward::kNo;
+  }
+  next_ = again ? now : next_attempt(shared, news, now);
   if (far) hurry(shared, now);
   return std::nullopt;
 }
@@ -103,6 +114,15 @@ void WaitingLookup::hurry(const Shared& shared, Clock::time_point now) {
   if (hurried_ || !shared.host.was_pushed(wanted_)) return;
   hurried_ = true;
   next_ = now;
+}
+
+bool WaitingLookup::put_forward(std::optional<Time> stamp, Clock::time_point when) {
+  const auto at = wanted_.query.at;
+  const bool is_later = at && stamp && *at > *stamp;
+  if (is_later || forward_ != Forward::kNo || !(far_ || asking_)) return false;
+  forward_ = asking_ ? Forward::kAfterThis : Forward::kNext;
+  if (!asking_) next_ = std::min(next_, when);
+  return true;
 }
 
 // Missing local data wakes the thread when it comes.
@@ -121,7 +141,10 @@ WaitingLookup::Clock::time_point WaitingLookup::next_attempt(const Shared& share
     }
   }
   pause = std::clamp(pause, kAskSoonest, kAskLatest);
-  return now + std::max<std::chrono::nanoseconds>(pause, news.waiting * kAskEvery);
+  const auto next = now + std::max<std::chrono::nanoseconds>(pause, news.waiting * kAskEvery);
+  const auto last =
+      limit_.at() - std::max<std::chrono::nanoseconds>(kLastAsked, news.waiting * kLastAskedEach);
+  return now < last ? std::min(next, last) : next;
 }
 
 }  // namespace tfdude

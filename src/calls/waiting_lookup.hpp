@@ -76,6 +76,13 @@ class WaitingLookup {
   /// When to attend at the latest.
   [[nodiscard]] Clock::time_point next() const { return std::min(next_, limit_.at()); }
 
+  /// What another lookup of these frames waited for has come: if this one may lack the same, it
+  /// asks again at `when`.
+  /// @param stamp  the instant of that one's answer
+  /// @return whether it does
+  bool put_forward(std::optional<Time> stamp, Clock::time_point when);
+
+  [[nodiscard]] const WantedLookup& wanted() const { return wanted_; }
   /// Why there is no answer so far.
   [[nodiscard]] const Error& last() const { return last_; }
 
@@ -102,8 +109,11 @@ class WaitingLookup {
   std::uint64_t version_ = 0;                          // at the last attempt
   bool far_ = false;                                   // others lacked data then
   bool hurried_ = false;                               // was asked again for pushed values
-  std::optional<LookupInProgress> plan_;               // in progress,
-  TimeLimit until_;                                    // until this time limit
+  // Because others were answered: an attempt after the request in progress, the next attempt, or
+  // one that was in vain since the last one in turn.
+  enum class Forward { kNo, kAfterThis, kNext, kInVain } forward_ = Forward::kNo;
+  std::optional<LookupInProgress> plan_;  // in progress,
+  TimeLimit until_;                       // until this time limit
   std::optional<PendingRequests> asking_;
 };
 

@@ -16,6 +16,10 @@ constexpr int kRest = 3;
 constexpr std::chrono::nanoseconds kShortestRest = std::chrono::microseconds(100);
 constexpr std::chrono::nanoseconds kLongestRest = Milliseconds(10);
 
+// Interval of requests for what has just come for others: it is there, but as many as wait must not
+// be sent at once.
+constexpr std::chrono::microseconds kAskForwardEvery{25};
+
 }  // namespace
 
 PendingLookups::PendingLookups(Forest& forest, ReplyTable& replies, RequestLink& link,
@@ -128,10 +132,12 @@ PendingLookups::Clock::time_point PendingLookups::run() {
 PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written) {
   auto next = Clock::time_point::max();
   const std::size_t waiting = all.size();
+  Arrived arrived;
   const auto over = [&](const std::unique_ptr<Lookup>& lookup) {
     if (lookup->callback != nullptr && lookup->callback->closed()) return true;
     const WaitingLookup::News news{version(), written, waiting};
     if (auto found = lookup->waiting.attend(shared_, news, Clock::now())) {
+      if (*found && waiting > 1) note(arrived, lookup->waiting.wanted(), (*found)->stamp);
       finish(*lookup, *std::move(found));
       return true;
     }
@@ -139,6 +145,26 @@ PendingLookups::Clock::time_point PendingLookups::attend(All& all, bool written)
     return false;
   };
   all.erase(std::remove_if(all.begin(), all.end(), over), all.end());
+  return std::min(next, put_forward(all, arrived));
+}
+
+void PendingLookups::note(Arrived& arrived, const WantedLookup& wanted, std::optional<Time> stamp) {
+  const auto [at, is_new] = arrived.emplace(std::pair(wanted.a, wanted.b), stamp);
+  if (!is_new && at->second) at->second = stamp ? std::max(*at->second, *stamp) : stamp;
+}
+
+PendingLookups::Clock::time_point PendingLookups::put_forward(const All& all,
+                                                              const Arrived& arrived) {
+  auto next = Clock::time_point::max();
+  if (arrived.empty()) return next;
+  auto when = Clock::now();
+  for (const auto& lookup : all) {
+    const WantedLookup& wanted = lookup->waiting.wanted();
+    const auto came = arrived.find({wanted.a, wanted.b});
+    if (came == arrived.end() || !lookup->waiting.put_forward(came->second, when)) continue;
+    next = std::min(next, when);
+    when += kAskForwardEvery;
+  }
   return next;
 }
 

@@ -3,9 +3,11 @@
 #include <atomic>
 #include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tfdude/types/query.hpp"
@@ -68,6 +70,8 @@ class PendingLookups final : private ReplyListener {
     std::shared_ptr<Found> found;               // with this
   };
   using All = std::vector<std::unique_ptr<Lookup>>;
+  /// The frames of lookups that were answered, and the latest instant of an answer.
+  using Arrived = std::map<std::pair<std::string, std::string>, std::optional<Time>>;
 
   void add(std::unique_ptr<Lookup> lookup);
   void all_replied() override { wake(urgent_); }
@@ -77,6 +81,10 @@ class PendingLookups final : private ReplyListener {
   }
   [[nodiscard]] Clock::time_point run();
   [[nodiscard]] Clock::time_point attend(All& all, bool written);
+  static void note(Arrived& arrived, const WantedLookup& wanted, std::optional<Time> stamp);
+  /// Asks again for those that wait for what has just come for others.
+  /// @return when there is more to do
+  [[nodiscard]] static Clock::time_point put_forward(const All& all, const Arrived& arrived);
   static void finish(Lookup& lookup, Found found);
   static void give_up(Lookup& lookup);
   [[nodiscard]] std::uint64_t version() const;
