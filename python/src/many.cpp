@@ -307,10 +307,11 @@ Batch of_trajectory(Trajectory&& trajectory, const std::vector<Time>& instants) 
 
 /// One lookup for each pair and instant, of which there are as many, or one for all.
 Batch lookup_many(const Session& session, std::vector<FramePair> pairs, py::handle at,
-                  py::handle timeout, py::handle extrapolate, int order, bool strict) {
+                  py::handle timeout, py::handle extrapolate, int order, bool strict,
+                  py::handle believed_at) {
   bool many = false;
   const auto stamps = to_stamps(at, many, "at");
-  Query query = to_query(py::none(), extrapolate, py::none(), order);
+  Query query = to_query(py::none(), extrapolate, py::none(), order, believed_at);
   const Milliseconds wait = to_milliseconds(timeout, "timeout");
   if (many && pairs.size() > 1 && stamps.size() > 1 && pairs.size() != stamps.size()) {
     throw py::value_error(std::to_string(pairs.size()) + " pairs, but " +
@@ -365,38 +366,44 @@ void bind_many(py::module_& module, ClientClass& cls) {
   cls.def(
       "lookup_many",
       [](const Session& session, const std::vector<std::pair<std::string, std::string>>& pairs,
-         py::handle at, py::handle timeout, py::handle extrapolate, int order, bool strict) {
+         py::handle at, py::handle timeout, py::handle extrapolate, int order, bool strict,
+         py::handle believed_at) {
         std::vector<FramePair> all;
         for (const auto& pair : pairs) all.push_back({pair.first, pair.second});
-        return lookup_many(session, std::move(all), at, timeout, extrapolate, order, strict);
+        return lookup_many(session, std::move(all), at, timeout, extrapolate, order, strict,
+                           believed_at);
       },
       py::arg("pairs"), py::arg("at") = py::none(), py::kw_only(), py::arg("timeout") = 0.0,
-      py::arg("extrapolate") = 0.0, py::arg("order") = 2, py::arg("strict") = true, kLookupMany);
+      py::arg("extrapolate") = 0.0, py::arg("order") = 2, py::arg("strict") = true,
+      py::arg("believed_at") = py::none(), kLookupMany);
   cls.def(
       "lookup_many",
       [](const Session& session, const std::string& a, const std::vector<std::string>& frames,
-         py::handle at, py::handle timeout, py::handle extrapolate, int order, bool strict) {
+         py::handle at, py::handle timeout, py::handle extrapolate, int order, bool strict,
+         py::handle believed_at) {
         std::vector<FramePair> all;
         for (const std::string& frame : frames) all.push_back({a, frame});
-        return lookup_many(session, std::move(all), at, timeout, extrapolate, order, strict);
+        return lookup_many(session, std::move(all), at, timeout, extrapolate, order, strict,
+                           believed_at);
       },
       py::arg("a"), py::arg("frames"), py::arg("at") = py::none(), py::kw_only(),
       py::arg("timeout") = 0.0, py::arg("extrapolate") = 0.0, py::arg("order") = 2,
-      py::arg("strict") = true, kLookupMany);
+      py::arg("strict") = true, py::arg("believed_at") = py::none(), kLookupMany);
   cls.def(
       "trajectory",
       [](const Session& session, const std::string& a, const std::string& b, py::handle instants,
-         py::handle timeout, py::handle extrapolate, int order) {
+         py::handle timeout, py::handle extrapolate, int order, py::handle believed_at) {
         std::vector<Time> times = to_instants(instants, "instants");
-        const Query query = to_query(py::none(), extrapolate, py::none(), order);
+        const Query query = to_query(py::none(), extrapolate, py::none(), order, believed_at);
         auto found = trajectory(session, a, b, times, query, to_milliseconds(timeout, "timeout"));
         return trajectory_object(value_of(std::move(found)), std::move(times));
       },
       py::arg("a"), py::arg("b"), py::arg("instants"), py::kw_only(), py::arg("timeout") = 0.0,
-      py::arg("extrapolate") = 0.0, py::arg("order") = 2,
+      py::arg("extrapolate") = 0.0, py::arg("order") = 2, py::arg("believed_at") = py::none(),
       "X_AB at many instants, in any order: a Trajectory, with arrays (N, 7) and (N, 6, 6).\n\n"
       "instants: an array of int [ns], float [s] or datetime64, or a sequence of instants.\n"
-      "timeout [s]: how long to wait for the last of them. Instants without data do not raise.");
+      "timeout [s]: how long to wait for the last of them. Instants without data do not raise.\n"
+      "believed_at: as in lookup().");
 }
 
 }  // namespace tfdude::python

@@ -40,6 +40,11 @@ def test_answers_as_of_then(client, owners):
     assert x(at, between) == 60
     assert x(at, client.now()) == 70
     assert x(at, None) == 70
+    for moment, expected in ((then, 14.5), (between, 60), (client.now(), 70)):
+        many = client.lookup_many("map", ["hand", "map"], at, believed_at=moment)
+        assert many.poses[:, 0].tolist() == [expected, 0]
+        assert client.lookup_many([("map", "hand")], [at, at], believed_at=moment).poses[1, 0] == expected
+        assert client.trajectory("map", "hand", [at], believed_at=moment).poses[0, 0] == expected
     assert x(None, then) == 19
     assert asyncio.run(client.lookup_async("map", "hand", at, believed_at=then)).translation[0] == 14.5
 

@@ -719,6 +719,7 @@ class Client:
         extrapolate: _Duration = 0.0,
         order: Literal[2, 4] = 2,
         strict: bool = True,
+        believed_at: _Instant | None = None,
     ) -> Batch: ...
     @overload
     def lookup_many(
@@ -731,6 +732,7 @@ class Client:
         extrapolate: _Duration = 0.0,
         order: Literal[2, 4] = 2,
         strict: bool = True,
+        believed_at: _Instant | None = None,
     ) -> Batch: ...
     def trajectory(
         self,
@@ -741,6 +743,7 @@ class Client:
         timeout: _Duration = 0.0,
         extrapolate: _Duration = 0.0,
         order: Literal[2, 4] = 2,
+        believed_at: _Instant | None = None,
     ) -> Trajectory: ...
     def lookup_full(
         self,
