@@ -69,6 +69,9 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
 
 Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<WatchedPath> path,
                                                          const Deadline& deadline) {
+  const auto route = route_of(*path);
+  // It is about what is asked for, so that waiting does not help.
+  if (!route && route.error().code == Errc::kInvalidInput) return tl::unexpected(route.error());
   watches_paths_ = true;
   add(path);
   auto live = path->wait_until_live(deadline.at());
@@ -77,12 +80,16 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<Watched
   return tl::unexpected(std::move(live.error()));
 }
 
-tl::unexpected<Error> WatchClient::unanswered(const WatchedPath& path, const Deadline& deadline) {
-  std::string owners;
+Result<WatchRoute> WatchClient::route_of(const WatchedPath& path) {
   const std::uint64_t own_incarnation = context_.member.incarnation();
   Structure& structure = context_.structure;
   const Lock lock(structure.mutex);
-  if (const auto route = path.route({structure.forest, structure.directory, own_incarnation})) {
+  return path.route({structure.forest, structure.directory, own_incarnation});
+}
+
+tl::unexpected<Error> WatchClient::unanswered(const WatchedPath& path, const Deadline& deadline) {
+  std::string owners;
+  if (const auto route = route_of(path)) {
     for (const WatchRoute::Source& source : route->sources) {
       owners += (owners.empty() ? "" : ", ") + quote(source.partition);
     }

@@ -76,6 +76,7 @@ class WatchClient final : private WatchLink {
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
                                                             const Deadline& deadline);
   /// kTimeout, naming the owners.
+  [[nodiscard]] Result<WatchRoute> route_of(const WatchedPath& path);
   [[nodiscard]] tl::unexpected<Error> unanswered(const WatchedPath& path, const Deadline& deadline);
 
   const Context context_;

@@ -31,6 +31,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::along_x;
+using testing::ContainsSubstring;
 using testing::eventually;
 using testing::Join;
 using testing::joined_by;
@@ -267,6 +268,25 @@ TEST_CASE("watch: an invalid rate is rejected") {
 
 #ifndef TFDUDE_THREAD_SANITIZER  // ThreadSanitizer does not see the locks of Fast DDS
 // Not more, because each costs milliseconds; pusher_test.cpp has 1,000 watches.
+TEST_CASE("watch: a path of too many edges is rejected at once") {
+  const Join join = testing::join_loopback();
+  std::vector<FrameSpec> frames{{"link0", "", {}}};
+  for (int i = 1; i <= 4097; ++i) {
+    frames.push_back({"link" + std::to_string(i), "link" + std::to_string(i - 1), {}});
+  }
+  const auto node = Node::open(join("chain"), "chain", frames);
+  REQUIRE(node);
+  Options patient;
+  patient.timeout = 60'000ms;
+  Client client = Client::open(join(""), patient).value();
+  const auto begin = std::chrono::steady_clock::now();
+  const auto watch = client.watch("link0", "link4097");
+  REQUIRE_FALSE(watch);
+  CHECK(watch.error().code == Errc::kInvalidInput);
+  CHECK_THAT(watch.error().message, ContainsSubstring("4097 edges at once, of at most 4096"));
+  CHECK(std::chrono::steady_clock::now() - begin < 30s);
+}
+
 TEST_CASE("watch: no writer is left after watches and clients have ended") {
   CountedDomain domain;
   auto base = Node::open(domain.join("base", true), "base",
