@@ -34,22 +34,26 @@ Result<LookupInProgress> Lookups::plan(const WantedLookup& wanted) {
       !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  const Lock lock(structure_.mutex);
-  return LookupInProgress::plan(structure_.forest, structure_.directory, structure_.clock.kind(),
-                                wanted, hints_, Deadline::Clock::now());
+  auto planned = [&] {
+    const Lock lock(structure_.mutex);
+    return LookupInProgress::plan(structure_.forest, structure_.directory, structure_.clock.kind(),
+                                  wanted, hints_, Deadline::Clock::now());
+  }();
+  if (planned) asked(planned->parts());
+  return planned;
 }
 
 Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view b,
                                             const Query& query, const Deadline& deadline) {
   LookupTask task(structure_.forest, structure_.clock.kind(), hints_,
                   {std::string(a), std::string(b), query});
-  auto asked = requests_.run(task, deadline);
+  const auto done = requests_.run(task, deadline);
   const bool of_last = query.last_known && !query.believed_at && memory_ != nullptr;
-  if (!asked && asked.error().code == Errc::kUnreachable && of_last) {
+  if (!done && done.error().code == Errc::kUnreachable && of_last) {
     if (auto last = memory_->last_known(std::string(a), std::string(b), query)) return last;
   }
-  if (!asked) return tl::unexpected(std::move(asked.error()));
-  if (memory_ != nullptr) memory_->asked(task.parts());
+  if (!done) return tl::unexpected(done.error());
+  asked(task.parts());
   return std::move(task.X_AB());
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "tfdude/math/transform.hpp"
 #include "tfdude/types/query.hpp"
@@ -65,6 +66,11 @@ class Lookups final : private LookupHost {
     if (!X_AB && !is_of_time(X_AB.error())) X_AB = elsewhere(a, b, query, deadline);
     return X_AB;
   }
+  /// From the memory of this process or of others only, and so without waiting for anybody.
+  /// @return the forest's error if the owners have to be asked
+  [[nodiscard]] Result<StampedTransform> read(Handle a, Handle b, const Query& query) {
+    return here([&](auto& from) { return from.lookup(a, b, query); });
+  }
   [[nodiscard]] Result<StampedTransform> wait(std::string_view a, std::string_view b,
                                               const Query& query, Milliseconds wait);
   /// @return a handle; the lookup is cancelled when its last copy is destroyed
@@ -74,6 +80,11 @@ class Lookups final : private LookupHost {
   [[nodiscard]] std::future<Result<StampedTransform>> start(const std::string& a,
                                                             const std::string& b,
                                                             const Query& query, Milliseconds wait);
+
+  /// Owners were asked for these: the memory of those on this computer is read from now on.
+  void asked(const std::vector<Part>& parts) {
+    if (memory_ != nullptr) memory_->asked(parts);
+  }
 
   /// As PendingLookups::pause().
   [[nodiscard]] bool pause(Deadline::Clock::time_point until) { return pending_.pause(until); }

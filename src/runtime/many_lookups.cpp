@@ -35,6 +35,7 @@ std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<Frame
     asked = requests_.run(task, deadline);
   }
   if (!asked) task.fail_all(asked.error());
+  lookups_.asked(task.parts());
   return std::move(task.found());
 }
 
@@ -77,20 +78,19 @@ Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_
                                                 const Query& query) {
   TrajectoryBuilder all(instants.size());
   Query at = query;
-  const Forest& forest = structure_.forest;
-  const auto from = forest.find(a);
-  const auto to = forest.find(b);
-  std::size_t i = 0;
-  while (from && to && i < instants.size()) {
+  const auto from = structure_.forest.find(a);
+  const auto to = structure_.forest.find(b);
+  for (std::size_t i = 0; i < instants.size();) {
     at.at = instants[i];
-    const auto found = forest.lookup(*from, *to, at);
-    if (!found && !is_of_time(found.error().code)) break;
-    all.add(i++, found);
-  }
-  while (i < instants.size()) {
+    if (from && to) {
+      const auto found = lookups_.read(*from, *to, at);
+      if (found || is_of_time(found.error().code)) {
+        all.add(i++, found);
+        continue;
+      }
+    }
     // No message can name an instant before zero.
     if (instants[i] < Time{}) {
-      at.at = instants[i];
       all.add(i, lookups_.lookup(a, b, at));
       ++i;
       continue;
@@ -99,10 +99,11 @@ Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_
     const auto most =
         begin + static_cast<std::ptrdiff_t>(std::min(instants.size() - i, InstantsTask::kMost));
     const auto end = std::find_if(begin, most, [](Time t) { return t < Time{}; });
-    InstantsTask task(forest, structure_.clock.kind(), {std::string(a), std::string(b), query},
-                      {begin, end});
+    InstantsTask task(structure_.forest, structure_.clock.kind(),
+                      {std::string(a), std::string(b), query}, {begin, end});
     auto asked = requests_.run(task, discovery_.call_deadline());
-    if (!asked) return tl::unexpected(std::move(asked.error()));
+    if (!asked) return tl::unexpected(asked.error());
+    lookups_.asked(task.parts());
     for (const auto& found : task.found()) all.add(i++, found);
   }
   return std::move(all).take();

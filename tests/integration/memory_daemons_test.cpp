@@ -60,7 +60,19 @@ struct Two : ThesisDaemons {
 TEST_CASE("memory: the first lookup attaches the owner, and partitions() says so") {
   Two d;
   CHECK_FALSE(partition(d.memory, "arms").in_memory);
-  REQUIRE(eventually([&] { return d.memory.lookup("world", "hand_left").has_value(); }));
+  const std::string how = GENERATE("lookup", "wait", "many", "trajectory");
+  CAPTURE(how);
+  REQUIRE(eventually([&] {
+    if (how == "wait") {
+      return d.memory.lookup_async("world", "hand_left", {}, std::chrono::seconds(20))
+          .get()
+          .has_value();
+    }
+    if (how == "many") return d.memory.lookup_many({{"world", "hand_left"}}, {})[0].has_value();
+    if (how == "lookup") return d.memory.lookup("world", "hand_left").has_value();
+    const auto all = d.memory.trajectory("world", "hand_left", {at_ms(0)});
+    return all && all->missing.empty();
+  }));
   CHECK(eventually([&] { return partition(d.memory, "arms").in_memory; }));
   CHECK(partition(d.memory, "arms").why_not_in_memory.empty());
   REQUIRE(d.dds.lookup("world", "hand_left"));
@@ -268,7 +280,7 @@ TEST_CASE("memory: an owner that stops is not taken for a dead one") {
   CHECK(partition(d.memory, "arms").stopped);
 }
 
-TEST_CASE("memory: velocities and lookups of two instants are those over DDS, and ask nobody") {
+TEST_CASE("memory: velocities, two instants and many are those over DDS, and ask nobody") {
   Two d;
   Random random(15);
   INFO("seed " << random.seed());
@@ -315,12 +327,27 @@ TEST_CASE("memory: velocities and lookups of two instants are those over DDS, an
     CHECK(transform_diff(two, two_expected, 1e-9, 1e-7) == "");
     CHECK(two.basis.bound == two_expected.basis.bound);
   }
+  // Some are outside of what is kept.
+  std::vector<Time> instants;
+  for (int ms = 980; ms < 1210; ms += 3) instants.push_back(at_ms(ms));
+  const auto many = d.memory.trajectory("world", "hand_left", instants).value();
+  const auto many_expected = d.dds.trajectory("world", "hand_left", instants).value();
+  CHECK(many.missing.size() == many_expected.missing.size());
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    CAPTURE(i);
+    REQUIRE(many.X_AB[i].has_value() == many_expected.X_AB[i].has_value());
+    if (!many.X_AB[i]) continue;
+    CHECK(transform_diff(*many.X_AB[i], *many_expected.X_AB[i], 1e-9, 1e-7) == "");
+  }
+  instants.resize(40);
+  instants.erase(instants.begin(), instants.begin() + 8);
   // Over DDS there would be no answer: it is not counted as lost before 450 ms.
   REQUIRE(asks_two(d.memory, 0));
   REQUIRE(d.memory.velocity("world", "arm_1"));
   d.arms->freeze();
   CHECK(asks_two(d.memory, 0));
   CHECK(d.memory.velocity("world", "arm_1"));
+  CHECK(d.memory.trajectory("world", "hand_left", instants));
   d.arms->signal(SIGCONT);
   REQUIRE(eventually([&] { return d.dds.lookup("world", "arm_1").has_value(); }));
   // What the owner has made up tells no velocity, and it is the owner who says so.
