@@ -25,6 +25,8 @@ class InstantsTask final : public Task {
   [[nodiscard]] std::vector<Part>& parts() override { return parts_; }
   [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point now) override;
 
+  /// What the owners were asked for, at some instant.
+  [[nodiscard]] const std::vector<Part>& planned() const { return plan_.parts; }
   /// Once it is done: by instant.
   [[nodiscard]] std::vector<Found>& found() { return found_; }
 

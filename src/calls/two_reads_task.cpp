@@ -55,7 +55,7 @@ Result<Task::Next> TwoReadsTask::take(std::vector<Reply> replies, Clock::time_po
   if (!answers) return tl::unexpected(std::move(answers.error()));
   if (asks_first_again_) {
     if (is_first_unchanged(*answers)) return conclude();
-    if (++tries_ < kMostTries) return ask_both(), Next::kAsk;
+    if (tries_ < kMostTries) return ask_both(), Next::kAsk;
     return fail(Errc::kChangedMeanwhile, "edges between " + quote(reads_[1].a) + " and " +
                                              quote(reads_[1].b) + " are changed all the time");
   }
@@ -63,7 +63,8 @@ Result<Task::Next> TwoReadsTask::take(std::vector<Reply> replies, Clock::time_po
   answers_[0].assign(std::make_move_iterator(answers->begin()), std::make_move_iterator(middle));
   answers_[1].assign(std::make_move_iterator(middle), std::make_move_iterator(answers->end()));
   if (are_of_one_state()) return conclude();
-  // Most commits change neither path at its instant.
+  if (++tries_ < kTriesForOneCommit) return ask_both(), Next::kAsk;
+  // Such an owner changes neither path at its instant with most of its commits.
   asks_first_again_ = true;
   parts_ = plans_[0].parts;
   return Next::kAsk;

@@ -22,8 +22,10 @@ class TwoReadsTask final : public Task {
     Query query;  ///< of an instant, or of edges that are static
   };
 
-  /// How often owners are asked anew that change edges between the two reads.
-  static constexpr int kMostTries = 10;
+  /// How often owners are asked anew that commit something between the two reads, before the values
+  /// are compared; and after that.
+  static constexpr int kTriesForOneCommit = 5;
+  static constexpr int kMostTries = 15;
 
   /// @param timed  stamps that an owner has made up do not count, as LookupRequest::timed
   TwoReadsTask(const Forest& forest, Read first, Read second, bool timed)

@@ -103,7 +103,7 @@ Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_
                       {std::string(a), std::string(b), query}, {begin, end});
     auto asked = requests_.run(task, discovery_.call_deadline());
     if (!asked) return tl::unexpected(asked.error());
-    lookups_.asked(task.parts());
+    lookups_.asked(task.planned());
     for (const auto& found : task.found()) all.add(i++, found);
   }
   return std::move(all).take();

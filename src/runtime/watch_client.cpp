@@ -70,7 +70,7 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::watch_edges(
 Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<WatchedPath> path,
                                                          const Deadline& deadline) {
   const auto route = route_of(*path);
-  // It is about what is asked for, so that waiting does not help.
+  // What is asked for is invalid, so that waiting does not help.
   if (!route && route.error().code == Errc::kInvalidInput) return tl::unexpected(route.error());
   watches_paths_ = true;
   add(path);
