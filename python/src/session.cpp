@@ -113,7 +113,11 @@ void Session::close() {
     static_cast<void>(new std::shared_ptr<Client>(std::move(client)));
     return;
   }
-  without_gil([&] { client.reset(); });
+  without_gil([&] {
+    // Calls in progress keep it, and end it with the last of them.
+    if (client.use_count() > 1) client->end_waits();
+    client.reset();
+  });
 }
 
 std::shared_ptr<Client> Session::client() const {

@@ -57,7 +57,7 @@ using SharedFunction = std::shared_ptr<py::function>;
 [[nodiscard]] Error closed_error();
 
 /// An open Client or Node, for the Python object of the same name. It can be closed while other
-/// threads call it; they finish first.
+/// threads call it; their waits end, and they finish first.
 class Session {
  public:
   /// @param partition  of a Node

@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -54,6 +56,27 @@ def test_a_node_in_python_serves_others(domain, hand):
             with pytest.raises(tfdude.UnreachableException) as raised:
                 client.lookup("base", "hand")
             assert raised.value.partition == "hand"
+
+
+def test_close_ends_the_wait_for_others(domain):
+    client = tfdude.Client(discovery=60, timeout=60, **domain)
+    calls = [client.roots, lambda: client.lookup("a", "b"), lambda: client.exists("a"), client.partitions]
+    codes = []
+
+    def run(call):
+        try:
+            codes.append(call())
+        except tfdude.TransformException as error:
+            codes.append(error.code)
+
+    threads = [threading.Thread(target=run, args=(call,)) for call in calls]
+    for thread in threads:
+        thread.start()
+    time.sleep(0.05)
+    client.close()
+    for thread in threads:
+        thread.join(20)
+    assert codes == ["transport"] * len(calls)
 
 
 @pytest.fixture

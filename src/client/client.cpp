@@ -71,6 +71,7 @@ Client::Client(std::unique_ptr<Participant> participant) : participant_(std::mov
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 Client::~Client() = default;
+void Client::end_waits() { participant_->end_waits(); }
 
 Result<Client> Client::open(const ClientOptions& options) {
   if (auto ok = check_follow(options); !ok) return tl::unexpected(std::move(ok.error()));

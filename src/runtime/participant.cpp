@@ -96,12 +96,16 @@ void Participant::end() {
   std::call_once(ended_, [this] { stop(); });
 }
 
-void Participant::stop() {
-  // Callbacks may use all other parts, but wait no longer.
+void Participant::end_waits() {
   lookups_.stop();
   watches_.end_waits();
   structure_.clock.end_waits();
   discovery_.end_waits();
+}
+
+void Participant::stop() {
+  // Callbacks may use all other parts, but wait no longer.
+  end_waits();
   one_shots_.stop();
   memory_.stop();
   member_.stop_events();

@@ -55,6 +55,8 @@ class Participant final : public TransportHandler,
   /// Stops all threads and leaves the network, as the destructor does: at exit. Then no function
   /// may be called.
   void end();
+  /// As Client::end_waits().
+  void end_waits();
 
   /// Makes this participant the owner of its partition. @return as Serving::serve()
   [[nodiscard]] Result<void> serve(const std::vector<FrameSpec>& frames);

@@ -78,6 +78,12 @@ class TFDUDE_EXPORT Client {
   /// owners have acknowledged streamed values.
   ~Client();
 
+  /// Ends the waits of other threads, and those of later calls, for frames, data, values, times and
+  /// participants: within 50 ms they return kTransport, or what is known. So a thread can be joined
+  /// before the client is destroyed. An owner that was asked is waited for as long as before.
+  /// @par Thread safety  May be called during any other call.
+  void end_waits();
+
   /// Adds a frame. An empty parent makes it a root.
   /// @param partition  its owner; empty: the parent's owner (for a root on a Node: this node)
   /// @return kAlreadyExists, kUnknownParent, kUnknownPartition, kInvalidInput.

@@ -64,6 +64,19 @@ struct Held {
 
 }  // namespace
 
+TEST_CASE("lifetimes: the waits of other threads can be ended before the client is") {
+  Pair pair;
+  Result<StampedTransform> X = fail(Errc::kTimeout, "not looked up yet");
+  const auto begin = std::chrono::steady_clock::now();
+  std::thread waits([&] { X = pair.client->lookup("arm", "nobody", {}, 60s); });
+  pair.client->end_waits();
+  waits.join();
+  REQUIRE_FALSE(X);
+  CHECK(X.error().code == Errc::kTransport);
+  CHECK(pair.client->lookup("arm", "nobody", {}, 60s).error().code == Errc::kTransport);
+  CHECK(std::chrono::steady_clock::now() - begin < 30s);
+}
+
 TEST_CASE("lifetimes: closing a client ends what its callbacks wait for") {
   Pair pair;
   const int what = GENERATE(0, 1, 2, 3);
