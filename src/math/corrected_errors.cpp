@@ -6,8 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/LU>
-
+#include "math/decompositions.hpp"
 #include "math/instant_sources.hpp"
 #include "math/joint_covariance.hpp"
 #include "math/joint_update.hpp"
@@ -107,7 +106,7 @@ class InstantErrors {
         errors.begin(), errors.end(),
         [](const CommonError& one) { return said_source(one.source).empty(); });
     for (auto one = of_instants; one != errors.end(); ++one) {
-      edge.own += one->loading * one->loading.transpose();
+      edge.own += square_of(one->loading);
     }
     errors.erase(of_instants, errors.end());
   }
@@ -250,7 +249,7 @@ std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearP
   const Loading rest = updated_root(own, seen, R, S);
   std::vector<CorrectedError> corrected;
   for (const Matrix6d& one : prior.own()) corrected.push_back({one, {}});
-  corrected[edge].own = rest * rest.transpose();
+  corrected[edge].own = square_of(rest);
   auto beside = linear.H;
   beside[prior.edges()[edge]].setZero();
   const Factor others(prior.own_on_path(beside));
@@ -308,7 +307,7 @@ std::vector<CorrectedError> carried(const JointPrior& prior, const LinearPath& l
                                     const Matrix6d& G, const Loading& noise, Left* left) {
   std::vector<CorrectedError> determined;
   for (const Matrix6d& own : prior.own()) determined.push_back({own, {}});
-  determined.push_back({noise * noise.transpose(), {}});
+  determined.push_back({square_of(noise), {}});
   for (const JointPrior::Source& source : prior.sources()) {
     std::vector<Loading> loadings = source.loadings;
     loadings.emplace_back(-G * source.on_path(prior, linear.H));
@@ -366,7 +365,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
     const Loading rest = prior.sources().empty()
                              ? updated_root(own, H[edges[0]] * own, R, S)
                              : joined(own - gains[0] * (H[edges[0]] * own), gains[0] * R);
-    corrected[0].own = rest * rest.transpose();
+    corrected[0].own = square_of(rest);
   }
   Left left{JointCovariance(edges.size()), {}};
   JointCovariance& observed = left.observed;
@@ -395,7 +394,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
 std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size_t u,
                                               const LinearPath& linear, const Loading& R,
                                               const std::string& new_source, bool merge) {
-  const Matrix6d G = linear.H[u].inverse();
+  const Matrix6d G = inverse_of(linear.H[u]);
   if (const Eigen::Index many = merge ? many_columns(prior) : 0; many > 0) {
     return determined_many(prior, linear, G, G * R, many, new_source);
   }

@@ -118,7 +118,7 @@ Result<Fused> fuse(const std::vector<Transform>& stated) {
     }
     X = X * exp(sum.mean);
     if (is_small(sum, hidden)) {
-      return Fused{{X, Covariance::trusted(Matrix6d(sum.root * sum.root.transpose()))}, iteration};
+      return Fused{{X, Covariance::trusted(square_of(sum.root))}, iteration};
     }
   }
   return fail(Errc::kInvalidInput, "the estimates lie too far apart to be fused");

@@ -7,10 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-
 #include "math/corrected_errors.hpp"
+#include "math/decompositions.hpp"
 #include "math/instant_sources.hpp"
 #include "math/low_rank.hpp"
 #include "math/semidefinite.hpp"
@@ -47,8 +45,7 @@ class JointCovariance {
   // Makes the errors of an edge independent of all others.
   void forget(std::vector<CorrectedError>& edges, std::size_t edge) {
     auto rows = columns_.middleRows(6 * static_cast<Eigen::Index>(edge), 6);
-    edges[edge].own =
-        nearest_semidefinite(edges[edge].own + rows * signs_.asDiagonal() * rows.transpose());
+    edges[edge].own = nearest_semidefinite(edges[edge].own + product(rows, rows));
     rows.setZero();
   }
 
@@ -58,7 +55,7 @@ class JointCovariance {
                                    std::size_t b) const {
     const auto F_a = columns_.middleRows(6 * static_cast<Eigen::Index>(a), 6);
     const auto F_b = columns_.middleRows(6 * static_cast<Eigen::Index>(b), 6);
-    const Matrix6d both = F_a * signs_.asDiagonal() * F_b.transpose();
+    const Matrix6d both = product(F_a, F_b);
     const auto inverse_deviations = [&](const auto& F, std::size_t i) {
       const Twist variances = edges[i].own.diagonal() + (F.cwiseAbs2() * signs_);
       return Twist(variances.unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0.0; }));
@@ -124,6 +121,12 @@ class JointCovariance {
   // Of the sum of what is subtracted from each other.
   static constexpr double kRounding = 1e-14;
 
+  // A diag(signs) Bᵀ.
+  [[nodiscard]] Eigen::MatrixXd product(const Eigen::Ref<const Eigen::MatrixXd>& A,
+                                        const Eigen::Ref<const Eigen::MatrixXd>& B) const {
+    return A * signs_.asDiagonal() * B.transpose();
+  }
+
   // The fewest columns with the same sum.
   struct Signed {
     Eigen::MatrixXd less;
@@ -135,15 +138,12 @@ class JointCovariance {
     const Eigen::VectorXd size = columns_.rowwise().norm();
     const Eigen::VectorXd unit =
         size.unaryExpr([](double one) { return one > 0 ? 1.0 / one : 0.0; });
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(unit.asDiagonal() * columns_);
+    const auto qr = qr_of(unit.asDiagonal() * columns_);
     const Eigen::Index rank = std::min(columns_.rows(), columns_.cols());
-    const Eigen::MatrixXd thin =
-        qr.householderQ() * Eigen::MatrixXd::Identity(columns_.rows(), rank);
     const Eigen::MatrixXd upper = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(upper * signs_.asDiagonal() *
-                                                                upper.transpose());
+    const auto solver = eigen_of(upper, signs_);
     const Eigen::VectorXd& values = solver.eigenvalues();  // ascending
-    const Eigen::MatrixXd vectors = size.asDiagonal() * thin * solver.eigenvectors();
+    const Eigen::MatrixXd vectors = size.asDiagonal() * thin_q(qr) * solver.eigenvectors();
     const double least = std::numeric_limits<double>::epsilon() * values.cwiseAbs().maxCoeff();
     Signed found{Eigen::MatrixXd(columns_.rows(), 0), Eigen::MatrixXd(columns_.rows(), 0)};
     const auto put = [&](Eigen::MatrixXd& to, Eigen::Index k) {
@@ -190,7 +190,7 @@ class JointCovariance {
   }
 
   [[nodiscard]] Eigen::MatrixXd dense(const std::vector<CorrectedError>& edges) const {
-    Eigen::MatrixXd P = columns_ * signs_.asDiagonal() * columns_.transpose();
+    Eigen::MatrixXd P = product(columns_, columns_);
     for (Eigen::Index i = 0; i < edges_; ++i) {
       P.block<6, 6>(6 * i, 6 * i) += edges[static_cast<std::size_t>(i)].own;
     }

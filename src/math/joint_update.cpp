@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include <Eigen/QR>
+#include "math/decompositions.hpp"
+#include "math/square_root.hpp"
 
 namespace tfdude {
 namespace {
@@ -25,7 +26,7 @@ struct Reflections {
   Matrix T;
 
   explicit Reflections(const Matrix& top) {
-    const Eigen::HouseholderQR<Matrix> qr(top.transpose());
+    const auto qr = qr_of(top.transpose());
     const Eigen::Index count = std::min(top.rows(), top.cols());
     V = qr.matrixQR().leftCols(count).triangularView<Eigen::UnitLower>();
     T = Matrix::Zero(count, count);
@@ -92,7 +93,7 @@ MeasuredJoint measured_joint(const std::vector<Loading>& own_roots, Matrix F,
   const auto row = [](std::size_t i) { return kRows * static_cast<Eigen::Index>(i); };
   const Eigen::Index rows = row(own_roots.size());
   MeasuredJoint found;
-  for (const Loading& root : own_roots) found.own.emplace_back(root * root.transpose());
+  for (const Loading& root : own_roots) found.own.push_back(square_of(root));
   Array seen{R, Matrix::Zero(rows, R.cols())};
   std::vector<Matrix> added;
   bool first = true;

@@ -6,8 +6,9 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+
+#include "math/decompositions.hpp"
+#include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
 namespace {
@@ -38,12 +39,12 @@ White white(const Block& A) {
   Vector scale = A.diagonal().cwiseMax(0.0).cwiseSqrt();
   for (double& one : scale) one = one > 0 ? one : 1.0;
   const Vector per = scale.cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Block> solver(per.asDiagonal() * A * per.asDiagonal());
-  const Vector roots = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-  const Vector inverse_roots = solver.eigenvalues().unaryExpr(
+  const SymmetricEigen eigen = symmetric_eigen(per.asDiagonal() * A * per.asDiagonal());
+  const Vector roots = eigen.values.cwiseMax(0.0).cwiseSqrt();
+  const Vector inverse_roots = eigen.values.unaryExpr(
       [](double value) { return value > kSingular ? 1.0 / std::sqrt(value) : 0.0; });
-  return {inverse_roots.asDiagonal() * solver.eigenvectors().transpose() * per.asDiagonal(),
-          scale.asDiagonal() * solver.eigenvectors() * roots.asDiagonal()};
+  return {inverse_roots.asDiagonal() * eigen.vectors.transpose() * per.asDiagonal(),
+          scale.asDiagonal() * eigen.vectors * roots.asDiagonal()};
 }
 
 class Hubs {
@@ -63,14 +64,14 @@ class Hubs {
   std::optional<BlocksAndColumns> run(Eigen::Index most_columns) {
     Matrix F(P_.rows(), 0);
     while (const auto hub = next()) {
-      const Eigen::SelfAdjointEigenSolver<Block> solver(P_.block<6, 6>(kSize * *hub, kSize * *hub));
+      const SymmetricEigen eigen = symmetric_eigen(P_.block<6, 6>(kSize * *hub, kSize * *hub));
       const Matrix with_others = P_.middleCols(kSize * *hub, kSize);
       for (Eigen::Index k = 0; k < kSize; ++k) {
-        const double value = solver.eigenvalues()[k];
+        const double value = eigen.values[k];
         if (value <= kSingular) continue;
         if (F.cols() == most_columns) return std::nullopt;
         F.conservativeResize(Eigen::NoChange, F.cols() + 1);
-        F.rightCols(1) = with_others * solver.eigenvectors().col(k) / std::sqrt(value);
+        F.rightCols(1) = with_others * eigen.vectors.col(k) / std::sqrt(value);
         P_.noalias() -= F.rightCols(1) * F.rightCols(1).transpose();
       }
       P_.middleRows(kSize * *hub, kSize).setZero();
@@ -136,7 +137,7 @@ Eigen::MatrixXd root_of_joint(const Eigen::MatrixXd& P) {
 
 Eigen::MatrixXd triangle_of_columns(const Eigen::MatrixXd& F) {
   if (F.cols() <= F.rows()) return F;
-  const Eigen::HouseholderQR<Matrix> qr(F.transpose());
+  const auto qr = qr_of(F.transpose());
   const Matrix upper = qr.matrixQR().topRows(F.rows()).triangularView<Eigen::Upper>();
   return upper.transpose();
 }

@@ -6,8 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include "tfdude/base/id.hpp"
 #include "tfdude/base/number.hpp"
 #include "tfdude/math/fusion.hpp"
@@ -15,6 +13,7 @@
 
 #include "math/bound_weights.hpp"
 #include "math/corrected_errors.hpp"
+#include "math/decompositions.hpp"
 #include "math/minimum.hpp"
 #include "math/observe_beside.hpp"
 #include "math/path_minimum.hpp"
@@ -141,13 +140,11 @@ class Update {
   // The covariance of the path as the edges have it.
   [[nodiscard]] Covariance path() const {
     const Loading root = prior_.path(at_start().H);
-    return Covariance::trusted(Matrix6d(root * root.transpose()));
+    return Covariance::trusted(square_of(root));
   }
 
   // The covariance of the measurement.
-  [[nodiscard]] Covariance R() const {
-    return Covariance::trusted(Matrix6d(root_ * root_.transpose()));
-  }
+  [[nodiscard]] Covariance R() const { return Covariance::trusted(square_of(root_)); }
 
   // With P and R by these factors.
   [[nodiscard]] PathMinimum minimum(const BoundWeights& weights) const {
@@ -281,9 +278,9 @@ class Unspecified {
       S = bound(S, seen(linear.H[k], edges_[k].X_PC.unknown->matrix()));
     }
     const Loading path = others.path(linear.H);
-    S = bound(S, Covariance::trusted(Matrix6d(path * path.transpose())));
+    S = bound(S, Covariance::trusted(square_of(path)));
     Belief& X_PC = found.edges[index_].X_PC;
-    X_PC.unknown = seen(linear.H[index_].inverse(), S.matrix());
+    X_PC.unknown = seen(inverse_of(linear.H[index_]), S.matrix());
     X_PC.common_errors.clear();
     found.edges[index_].corrected = true;
     return found;
@@ -376,7 +373,7 @@ bool is_better_anew(const std::vector<ObservedEdge>& edges, std::size_t index,
       linearize(others, std::vector<Twist>(others.size(), Twist::Zero()), Z_AB.pose);
   const Loading seen =
       joined(JointPrior(others).path(linear.H), root_of(Z_AB.covariance.of_specified().matrix()));
-  const Twist anew = (linear.H[index].inverse() * seen).rowwise().squaredNorm();
+  const Twist anew = (inverse_of(linear.H[index]) * seen).rowwise().squaredNorm();
   const Twist before = edges[index].X_PC.unknown.value_or(Covariance()).matrix().diagonal();
   return units_of(before).dot(anew) <= kMost * units_of(before).dot(before);
 }

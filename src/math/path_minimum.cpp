@@ -5,9 +5,9 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include "tfdude/math/perturbation.hpp"
+
+#include "math/decompositions.hpp"
 
 namespace tfdude {
 namespace {
@@ -224,7 +224,7 @@ LinearPath linearize(const std::vector<ObservedEdge>& edges, const std::vector<T
   }
   linear.X_AB = X_FB;
   linear.h = log(Z_AB.inverse() * X_FB);
-  const Matrix6d outer = right_jacobian(linear.h).inverse();
+  const Matrix6d outer = inverse_of(right_jacobian(linear.h));
   for (Matrix6d& H : linear.H) H = (outer * H).eval();
   return linear;
 }

@@ -4,19 +4,32 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+
+#include "math/decompositions.hpp"
 
 namespace tfdude {
 namespace {
 
-// Lower left triangle L with L Lᵀ = A Aᵀ. The error of each row is relative to that row.
+// Lower left triangle L with L Lᵀ = A Aᵀ. The error of each row is relative to that row. By the
+// steps of Eigen's HouseholderQR, without what that has for more columns: the compiler needs
+// seconds for it.
 Matrix6d triangle_of(const Loading& A) {
   Whitening turned = Whitening::Zero(std::max<Eigen::Index>(A.cols(), 6), 6);
   turned.topRows(A.cols()) = A.transpose();
-  const Eigen::HouseholderQR<Whitening> qr(turned);
-  const Matrix6d upper = qr.matrixQR().topRows<6>().triangularView<Eigen::Upper>();
+  Twist workspace;
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    const Eigen::Index rows = turned.rows() - k;
+    auto column = turned.col(k).tail(rows);
+    double factor = 0;
+    double length = 0;
+    column.makeHouseholderInPlace(factor, length);
+    turned(k, k) = length;
+    turned.bottomRightCorner(rows, 5 - k)
+        .applyHouseholderOnTheLeft(column.tail(rows - 1), factor, workspace.data());
+  }
+  const Matrix6d upper = turned.topRows<6>().triangularView<Eigen::Upper>();
   return upper.transpose();
 }
 
@@ -51,6 +64,8 @@ Loading root_of(const Matrix6d& semidefinite) {
   return size.asDiagonal() * root;
 }
 
+Matrix6d square_of(const Loading& root) { return root * root.transpose(); }
+
 Loading joined(const Loading& A, const Loading& B) {
   Loading both(6, A.cols() + B.cols());
   both << A, B;
@@ -75,8 +90,8 @@ Loading root_of_difference(const Loading& C, const Loading& D) {
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const auto rank = static_cast<Eigen::Index>(whole.rank());
   if (rank == 0) return Loading(6, 0);  // Eigen decomposes no empty matrix
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> rest(Eigen::MatrixXd::Identity(rank, rank) -
-                                                            taken * taken.transpose());
+  const Eigen::MatrixXd lost = taken * taken.transpose();
+  const auto rest = eigen_of(Eigen::MatrixXd::Identity(rank, rank) - lost);
   return whole.root() * rest.eigenvectors() *
          rest.eigenvalues().cwiseMax(kEpsilon).cwiseSqrt().asDiagonal();
 }
@@ -136,7 +151,7 @@ Loading updated_root(const Loading& L, const Loading& A, const Loading& R, const
   array.topLeftCorner(A.cols(), rank) = (S.whitening() * A).transpose();
   array.block(A.cols(), 0, R.cols(), rank) = (S.whitening() * R).transpose();
   array.topRightCorner(A.cols(), 6) = L.transpose();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(array);
+  const auto qr = qr_of(array);
   const Matrix6d rest = qr.matrixQR().block<6, 6>(rank, rank).triangularView<Eigen::Upper>();
   return rest.transpose();
 }

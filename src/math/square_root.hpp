@@ -15,6 +15,9 @@ inline constexpr double kRoundingShare = 16 * std::numeric_limits<double>::epsil
 /// axis's own deviation. What is left below rounding, or negative, counts as zero.
 [[nodiscard]] Loading root_of(const Matrix6d& semidefinite);
 
+/// L Lᵀ.
+[[nodiscard]] Matrix6d square_of(const Loading& root);
+
 /// Side by side: a root of A + B from those of A and B.
 [[nodiscard]] Loading joined(const Loading& A, const Loading& B);
 
