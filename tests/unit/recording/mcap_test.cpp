@@ -280,18 +280,21 @@ class EndlessIndex final : public ByteSource {
   }
   [[nodiscard]] Result<void> read(std::uint64_t offset, std::size_t count,
                                   std::string& out) const override {
-    out.resize(count);
-    for (std::size_t i = 0; i < count; ++i) out[i] = at(offset + i);
+    out.clear();
+    while (out.size() < count) out += from(offset + out.size()).substr(0, count - out.size());
     return {};
   }
 
  private:
-  [[nodiscard]] char at(std::uint64_t offset) const {
-    if (offset < head_.size()) return head_[offset];
+  // Up to the end of the head, of a record or of the tail.
+  [[nodiscard]] std::string_view from(std::uint64_t offset) const {
+    if (offset < head_.size()) return std::string_view(head_).substr(offset);
     offset -= head_.size();
-    if (offset < records_ * record_.size()) return record_[offset % record_.size()];
-    return tail_[offset - records_ * record_.size()];
+    const std::uint64_t of_records = records_ * record_.size();
+    if (offset < of_records) return std::string_view(record_).substr(offset % record_.size());
+    return std::string_view(tail_).substr(offset - of_records);
   }
+
   std::uint64_t records_;
   std::string head_;
   std::string record_;
