@@ -287,7 +287,7 @@ TEST_CASE("robots: an arm's covariance is that of samples of its joints") {
   INFO("seed " << random.seed());
   const auto arm = load("ur5e.urdf");
   constexpr double kSigma = 1e-3;
-  constexpr int kSamples = 20000;
+  constexpr int kSamples = 10000;
   for (int run = 0; run < 3; ++run) {
     const Positions q = random_positions(arm, random);
     const Transform X = path(arm, "base_link", "tool0", q, kSigma * kSigma);
