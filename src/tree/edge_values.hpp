@@ -178,7 +178,7 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   TransformParts first{};
   TransformParts second{};
   typename Edge::Copy copy;
-  if (!noisy && samples.given_parts(*found.before, first) &&
+  if (!noisy && !samples.drifts() && samples.given_parts(*found.before, first) &&
       samples.given_parts(*found.after, second)) {
     if (!correlate_as_said(path, from, copy)) return not_readable();
     path.up_between(first, second, s);

@@ -135,7 +135,7 @@ void Forest::Impl::resume_history(HeldVersion& fresh, const StoredTime& left,
   const bool revised = given && fresh.correlation != nullptr && fresh.correlation->revised();
   SampleRevision revision;
   if (revised) {
-    const RowInfo row{true, false, 0, nanoseconds(*left.stamp)};
+    const RowInfo row{true, false, 0, {}, nanoseconds(*left.stamp)};
     revision = {{*given, {}}, fresh.correlation->now(), row};
   }
   append_to(fresh, {fresh.X_PC, nullptr, revised ? &revision : nullptr}, nanoseconds(*left.stamp));

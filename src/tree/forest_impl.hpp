@@ -216,6 +216,11 @@ class Forest::Impl {
   /// Pushes a value of one edge. @return whether it is new here
   bool push_told(const HeldVersion& edge, const PushedValue& value, bool replace)
       TFDUDE_REQUIRES(mutex_);
+  /// What a watcher knows of a sample of an edge that drifts; empty: it is as it was given.
+  [[nodiscard]] std::optional<SampleRevision> told_of_drift(const HeldVersion& edge,
+                                                            const GivenValue& value,
+                                                            std::int64_t stamp)
+      TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const PushedValue& told, bool replace)
       TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const GivenValue& value, std::int64_t stamp,

@@ -1,7 +1,9 @@
 #include <algorithm>
 
+#include "math/drift.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
+#include "tree/revised_sample.hpp"
 
 // Applies values from another forest.
 namespace tfdude {
@@ -51,9 +53,62 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& 
   return push_told_sample(edge, {told.X, nullptr, &revision}, stamp, replace);
 }
 
+// How a sample of an edge that drifts was given, from which follows how it has moved, is in no
+// message. One that is corrected later was given as it was told first. A new one is as far from the
+// one before as it was given, unless it was corrected alone.
+std::optional<SampleRevision> Forest::Impl::told_of_drift(const HeldVersion& edge,
+                                                          const GivenValue& value,
+                                                          std::int64_t stamp) {
+  const SampleHistory& samples = *edge.samples;
+  const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+  const bool corrected = value.revision != nullptr;
+  SampleRevision fresh{{value.X_PC.pose, {}}, {}, {}};
+  if (corrected) {
+    fresh.correlation = value.revision->correlation;
+  } else if (said != nullptr) {
+    fresh.correlation = *said;
+  }
+  fresh.row.told = Told::kAsGiven;
+  const bool first = !edge.moving() || edge.lacks_sample();
+  const std::uint64_t place = first ? 0 : samples.place_of(stamp);
+  const Sample* after = !first && place < samples.next() ? samples.sample(place) : nullptr;
+  const Sample* before = !first && place > samples.oldest() ? samples.sample(place - 1) : nullptr;
+  const Sample* other = before != nullptr ? before : after;
+  if (other == nullptr) return corrected ? std::optional(fresh) : std::nullopt;
+  if (after != nullptr && after->stamp == stamp) {
+    const SharedRevision* revision = after->revision();
+    if (!corrected && revision == nullptr && same(after->value(), value.X_PC)) return std::nullopt;
+    fresh.given = given(*after);
+    if (revision != nullptr) fresh.row.told = revision->row.told;
+    return fresh;
+  }
+  fresh.given.pose = given(*other).pose * other->value_pose().inverse() * value.X_PC.pose;
+  if (before == nullptr || follows(*before, said, value.X_PC, fresh.correlation)) {
+    const bool as_given = !corrected && other->revision() == nullptr;
+    return as_given ? std::nullopt : std::optional(fresh);
+  }
+  if (after == nullptr) {
+    fresh.row.told = Told::kGuessed;
+    return fresh;
+  }
+  // This sample is that of an observation between both.
+  const double s = static_cast<double>(stamp - before->stamp) /
+                   static_cast<double>(after->stamp - before->stamp);
+  interpolate(given(*before).pose, given(*after).pose, s, fresh.given.pose);
+  fresh.row.between = true;
+  return fresh;
+}
+
 bool Forest::Impl::push_told_sample(const HeldVersion& edge, const GivenValue& value,
                                     std::int64_t stamp, bool replace) {
   if (stamp < 0) return false;
+  const bool knows = value.revision != nullptr && value.revision->row.told != Told::kNot;
+  if (drifts(edge) && !knows) {
+    const auto revision = told_of_drift(edge, value, stamp);
+    if (revision) {
+      return push_told_sample(edge, {value.X_PC, nullptr, &*revision}, stamp, replace);
+    }
+  }
   const std::uint32_t slot = edge.slot;
   if (edge.moving() && stamp <= edge.stamp) {
     const std::uint64_t place = edge.samples->place_of(stamp);

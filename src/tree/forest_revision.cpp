@@ -165,7 +165,7 @@ void Forest::Impl::replace_followers(const HeldVersion& edge, std::uint64_t firs
     const Sample& before = *superseded->sample(number);
     const CorrelatedValue& value = values[number - first];
     const SampleRevision moved{
-        {given(before).pose, {}}, value.correlation, {false, is_between(before), 0, follows}};
+        {given(before).pose, {}}, value.correlation, {false, is_between(before), 0, {}, follows}};
     begins = begins || superseded->has_instants(number);
     samples.push_back(sample_at(*superseded, number, {value.X_PC, nullptr, &moved}, before.stamp));
     if (telling == Telling::kLater) samples.back().commit = before.commit;
@@ -237,7 +237,8 @@ void Forest::Impl::revise_samples(std::uint32_t slot, const std::vector<const Re
     const bool follows = i > 0 && is_tied(*revisions[i - 1]);
     const std::int64_t before = follows ? stamp_of(*revisions[i - 1], stamp) : kAlways;
     const bool is_last = i + 1 == revisions.size();
-    revise_sample(frames_.newest_value(slot), *revisions[i], at, {true, false, lasts, at, before},
+    const RowInfo row{true, false, lasts, {}, at, before};
+    revise_sample(frames_.newest_value(slot), *revisions[i], at, row,
                   is_last || tells_all ? Telling::kNow : Telling::kLater);
   }
   if (merges(revisions)) {

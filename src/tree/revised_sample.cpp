@@ -8,32 +8,42 @@
 #include "tfdude/math/perturbation.hpp"
 
 #include "math/common_errors.hpp"
+#include "math/drift.hpp"
 #include "math/random_walk.hpp"
 #include "math/semidefinite.hpp"
 
 namespace tfdude {
 namespace {
 
-Belief belief_of(const Sample& sample, const Correlation* said) {
-  const Transform X = sample.value();
+Belief belief_of(const Transform& X, const Correlation* correlation) {
   Belief belief;
   belief.pose = X.pose;
   belief.own = X.covariance.of_specified();
   belief.unspecified = !X.covariance.complete();
-  const Correlation* correlation = correlation_at(sample, said);
   if (correlation == nullptr) return belief;
   belief.common_errors = correlation->common_errors;
   if (correlation->unknown) belief.unknown = std::exchange(belief.own, {});
   return belief;
 }
 
+Belief belief_of(const Sample& sample, const Correlation* said) {
+  return belief_of(sample.value(), correlation_at(sample, said));
+}
+
+// Whether its owner has not told how it was given.
+bool is_guessed(const Sample& sample) {
+  return sample.revision() != nullptr && sample.revision()->row.told == Told::kGuessed;
+}
+
 // Whether observations have found the second sample elsewhere than where the first one and the way
 // between both lead.
 bool is_found_elsewhere(const Sample& before, const Sample& after) {
   if (after.revision() == nullptr) return false;
+  const RowInfo& row = after.revision()->row;
+  if (row.told == Told::kGuessed) return true;
   // From a row on, it is on the way that was given, which may have come later.
   const bool follows_row = before.revision() == nullptr || before.revision()->row.observed;
-  if (follows_row && !after.revision()->row.observed) return false;
+  if (follows_row && !row.observed && row.told == Told::kNot) return false;
   constexpr double kRounding = 1e-9;
   const Pose way = given(before).pose.inverse() * given(after).pose;
   const Pose led = before.value_pose() * way;
@@ -146,6 +156,11 @@ CorrelatedValue drifted(const Sample& before, const Correlation* said, const Pos
   return found;
 }
 
+bool follows(const Sample& before, const Correlation* said, const Transform& X_PC,
+             const Correlation& correlation) {
+  return drift_between(belief_of(before, said), belief_of(X_PC, &correlation)).has_value();
+}
+
 Transform given(const Sample& sample) {
   const SharedRevision* revision = sample.revision();
   return revision != nullptr ? revision->given : sample.value();
@@ -180,7 +195,15 @@ CorrelatedValue drifted_between(const Sample& before, const Sample& after, doubl
     interpolate(given(before).pose, given(after).pose, s, G_PC);
     return drifted(before, said, G_PC, {walk.density, s * walk.seconds});
   }
-  return interpolate_observed(before, after, s, said, &walk);
+  CorrelatedValue found = interpolate_observed(before, after, s, said, &walk);
+  if (is_guessed(after) && found.X_PC.covariance.complete()) {
+    // Perhaps nothing was observed, but the first sample came late, and leads to the second.
+    const CorrelatedValue led =
+        drifted(before.value(), correlation_at(before, said),
+                before.value_pose().inverse() * found.X_PC.pose, {walk.density, s * walk.seconds});
+    found.X_PC.covariance += whole(led.X_PC, led.correlation, nullptr).covariance.of_specified();
+  }
+  return found;
 }
 
 CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after,
@@ -209,6 +232,12 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
     // If the edge truly goes on evenly, the twist is wrong by what the last interval has added, so
     // that this counts s times: its variance s², of which the newest sample has 1.
     if (complete) X.covariance += walked(walk->density, ahead, (1.0 + s) * walk->seconds);
+    if (complete && is_guessed(after)) {
+      const Covariance of_ends = bound(collapse(belief_of(before, said)).covariance.of_specified(),
+                                       collapse(X1).covariance.of_specified());
+      X.covariance = bound(X.covariance.of_specified(),
+                           Covariance::trusted(Matrix6d(beyond * beyond * of_ends.matrix())));
+    }
   } else {
     const Covariance of_twist = bound(with_said(G0, said), with_said(G1, said));
     X.covariance =

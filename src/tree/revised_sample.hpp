@@ -44,6 +44,11 @@ struct Walk {
 [[nodiscard]] CorrelatedValue drifted_between(const Sample& before, const Sample& after, double s,
                                               const Correlation* said, const Walk& walk);
 
+/// Whether a value that a watcher is told of an edge that drifts follows from the sample before: no
+/// observation has corrected it alone.
+[[nodiscard]] bool follows(const Sample& before, const Correlation* said, const Transform& X_PC,
+                           const Correlation& correlation);
+
 /// Of a sample, as it was before all observations.
 [[nodiscard]] Transform given(const Sample& sample);
 

@@ -88,6 +88,13 @@ class EdgeCorrelation {
   const SharedCorrelation now_;
 };
 
+/// Of a watcher, who is not told which samples were observed, nor how they were given.
+enum class Told : std::uint8_t {
+  kNot,      ///< it is its owner's
+  kAsGiven,  ///< how it was given follows from what was told
+  kGuessed,  ///< it was corrected when it was told first, so that this is not known
+};
+
 /// The place of a sample among those of an edge that drifts, in the joint covariance of what was
 /// observed. Stamps: INT64_MIN is none.
 struct RowInfo {
@@ -95,6 +102,7 @@ struct RowInfo {
   bool between = false;   ///< of an observation between two samples: none was given for the stamp
   /// How long, and how many, rows are kept (sample_rows.hpp); 0: this one only.
   std::uint8_t lasts = 0;
+  Told told = Told::kNot;
   std::int64_t follows = INT64_MIN;  ///< stamp of the last observed sample, from which it follows
   std::int64_t before = INT64_MIN;   ///< stamp of the row before this one that is kept, too
 };

@@ -2,10 +2,12 @@
 
 #include <chrono>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/drifting.hpp"
 #include "support/forest_support.hpp"
 #include "support/pose_diff.hpp"
 #include "support/random.hpp"
@@ -57,6 +59,57 @@ struct Followed {
   std::vector<EdgeCursor> cursors{{"arm", "world"}, {"hand", "arm"}};
   std::vector<Handle> edges;
 };
+
+// world -> base at a watcher.
+struct BaseMirror {
+  BaseMirror() {
+    REQUIRE(forest.add("world", "", {}));
+    REQUIRE(forest.add("base", "world", {}));
+    edges.push_back(*forest.find("base"));
+  }
+  void follow(const Forest& owner) {
+    forest.take(edges, owner.values_since(cursors, {false, at(0), true, true}).values);
+  }
+
+  Forest forest;
+  std::vector<EdgeCursor> cursors{{"base", "world"}};
+  std::vector<Handle> edges;
+};
+
+// Drives and observes at random instants: late ones, between samples, and beyond them. A pose that
+// comes late for the stamp of an observation is left out: watchers are not told of it.
+struct RandomDrive {
+  RandomDrive(std::uint64_t seed, bool noisy)
+      : random(seed), robot(noisy ? testing::of_deviations(0.02, 0.01) : Covariance()) {}
+
+  void step(int number) {
+    const auto t = static_cast<std::int64_t>(1000 * random.index(10));
+    const std::size_t action = number < 2 ? 0 : random.index(3);
+    if (action == 0 && seen.count(t) == 0) {
+      const Transform X{exp(random.twist(1.0)), testing::of_deviations(0.01, 0.02)};
+      if (robot.forest.update("base", X, at(t))) done += " update " + std::to_string(t);
+    } else if (action != 0) {
+      const std::int64_t then = action == 1 ? t : t + 500;
+      const Transform Z{exp(0.1 * random.twist(1.0)), testing::of_deviations(0.01, 0.01)};
+      const std::string source = std::string(kObservedPrefix) + std::to_string(number);
+      if (!robot.see(Z, at(then), source)) return;
+      seen.insert(then);
+      done += " see " + std::to_string(then);
+    }
+  }
+
+  Random random;
+  testing::Drifting robot;
+  std::set<std::int64_t> seen;
+  std::string done = "done:";
+};
+
+Query until_a_second_after(std::int64_t t) {
+  Query query;
+  query.at = at(t);
+  query.extrapolate = 1s;
+  return query;
+}
 
 }  // namespace
 
@@ -157,6 +210,55 @@ TEST_CASE("readers of the mirror see each push as one commit") {
   again[0].index = 7;  // of none
   robot.mirror.take(robot.edges, again);
   CHECK(commits == 1);
+}
+
+TEST_CASE("a mirror of an edge that drifts has the values of its owner at all instants") {
+  constexpr std::uint64_t kSeed = 6701;
+  for (std::uint64_t run = 0; run < 100; ++run) {
+    INFO("seed " << kSeed + run);
+    RandomDrive drive(kSeed + run, run % 2 == 0);
+    BaseMirror mirror;
+    for (int step = 0; step < 12; ++step) {
+      drive.step(step);
+      mirror.follow(drive.robot.forest);
+      INFO(drive.done);
+      for (std::int64_t then = 0; then <= 11000; then += 250) {
+        INFO("at " << then);
+        const Query query = until_a_second_after(then);
+        const auto expected = drive.robot.forest.lookup("world", "base", query);
+        const auto actual = mirror.forest.lookup("world", "base", query);
+        REQUIRE(outcome(expected) == outcome(actual));
+        if (expected) CHECK(testing::transform_diff(*actual, *expected, 1e-9) == "");
+      }
+    }
+  }
+}
+
+// Such a watcher was never told how a sample was given that had been corrected.
+TEST_CASE("a mirror of an edge that drifts is not more certain than its owner if it begins late") {
+  constexpr std::uint64_t kSeed = 6901;
+  for (std::uint64_t run = 0; run < 100; ++run) {
+    INFO("seed " << kSeed + run);
+    RandomDrive drive(kSeed + run, run % 2 == 0);
+    BaseMirror mirror;
+    for (int step = 0; step < 12; ++step) {
+      drive.step(step);
+      if (step < 6) continue;
+      mirror.follow(drive.robot.forest);
+      INFO(drive.done);
+      for (std::int64_t then = 0; then <= 11000; then += 250) {
+        INFO("at " << then);
+        const Query query = until_a_second_after(then);
+        const auto expected = drive.robot.forest.lookup("world", "base", query);
+        const auto actual = mirror.forest.lookup("world", "base", query);
+        if (!expected) continue;
+        REQUIRE(actual);
+        const Twist least = expected->covariance.of_specified().matrix().diagonal();
+        const Twist found = actual->covariance.of_specified().matrix().diagonal();
+        CHECK((found.array() >= (1.0 - 1e-6) * least.array()).all());
+      }
+    }
+  }
 }
 
 }  // namespace tfdude
