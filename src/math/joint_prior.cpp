@@ -5,6 +5,7 @@
 
 #include "math/common_errors.hpp"
 #include "math/square_root.hpp"
+#include "math/unknown_rotation.hpp"
 
 namespace tfdude {
 namespace {
@@ -40,7 +41,7 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
     const bool observed = std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
     if (all[k].way == ObservedEdge::Way::kBeside && !observed) continue;
     edges_.push_back(k);
-    own_.push_back(X.own.matrix());
+    own_.push_back(with_bounded_rotations(X.own.matrix()));
     own_roots_.push_back(root_of(own_.back()));
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
@@ -54,12 +55,14 @@ JointPrior::JointPrior(const std::vector<ObservedEdge>& all) : all_(all) {
     Eigen::Index columns = 0;
     for (const Loading& loading : source.loadings) columns = std::max(columns, loading.cols());
     for (Loading& loading : source.loadings) tfdude::widen(loading, columns);
+    // What observations have left is bounded already, and part of a difference.
+    if (!is_observed({source.name, source.subtracts, {}})) bound_rotations(source.loadings);
   }
 }
 
 void JointPrior::take_unknown(std::size_t edge) {
   edges_ = {edge};
-  own_ = {all_[edge].X_PC.unknown->matrix()};
+  own_ = {with_bounded_rotations(all_[edge].X_PC.unknown->matrix())};
   own_roots_ = {root_of(own_.front())};
   sources_.clear();
   of_unknown_ = true;

@@ -31,7 +31,8 @@ class JointPrior {
     [[nodiscard]] Loading on_path(const JointPrior& prior, const std::vector<Matrix6d>& H) const;
   };
 
-  /// Takes the own parts and common errors of the edges. Edges without either are left out.
+  /// Takes the own parts and common errors of the edges, with bounded rotations
+  /// (unknown_rotation.hpp). Edges without either are left out.
   explicit JointPrior(const std::vector<ObservedEdge>& all);
 
   /// Treats the edge's unknown part as its own; no other edge of the path may be uncertain. Those

@@ -28,6 +28,11 @@ Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
   return Covariance::trusted(nearest_semidefinite(H * sigma * H.transpose()));
 }
 
+// Of a part of unknown correlation, which counts as measurement error.
+Covariance unknown_seen(const Matrix6d& H, const Belief& edge) {
+  return seen(H, with_bounded_rotations(edge.unknown->matrix()));
+}
+
 void forget(const CorrectedError& error, ObservedResult& result) {
   result.forgotten = error.forgotten;
   if (error.depends) result.X_PC.unknown = std::exchange(result.X_PC.own, {});
@@ -118,7 +123,7 @@ class Update {
     } else if (prior_.has_path()) {
       const auto H = at_start().H;
       for (const std::size_t k : unknown) {
-        root_ = root_of(bound(R(), seen(H[k], all_[k].X_PC.unknown->matrix())).matrix());
+        root_ = root_of(bound(R(), unknown_seen(H[k], all_[k].X_PC)).matrix());
       }
     } else if (unknown.empty()) {
       return fail(Errc::kInvalidInput,
@@ -275,7 +280,7 @@ class Unspecified {
     }
     Covariance S = Z_AB_.covariance.of_specified();
     for (const std::size_t k : unknown) {
-      S = bound(S, seen(linear.H[k], edges_[k].X_PC.unknown->matrix()));
+      S = bound(S, unknown_seen(linear.H[k], edges_[k].X_PC));
     }
     const Loading path = others.path(linear.H);
     S = bound(S, Covariance::trusted(square_of(path)));

@@ -1,5 +1,6 @@
 #include "math/unknown_rotation.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/SVD>
@@ -14,6 +15,8 @@ constexpr double kAnywhere = 3.289868133696453;
 // Instead of what was stated [rad]: the rotation is that of the path, and must not confirm it, how
 // often it may be measured.
 constexpr double kNothing = 1e3;
+// What counts of an edge's own rotation [rad]: 55 times what is possible.
+constexpr double kCounted = 100;
 
 struct RotationAxes {
   Eigen::Matrix3d axes;  // columns, those that are known first
@@ -77,6 +80,23 @@ Measured with_one_turn(const Measured& Z_AB, const RotationAxes& of, const Eigen
 }
 
 }  // namespace
+
+void bound_rotations(std::vector<Loading>& loadings) {
+  const Eigen::Index count = loadings.empty() ? 0 : loadings.front().cols();
+  for (Eigen::Index k = 0; k < count; ++k) {
+    double most = 0;
+    for (const Loading& one : loadings) most = std::max(most, one.col(k).tail<3>().norm());
+    if (most <= kCounted) continue;
+    for (Loading& one : loadings) one.col(k) *= kCounted / most;
+  }
+}
+
+Matrix6d with_bounded_rotations(const Matrix6d& covariance) {
+  if (covariance.diagonal().tail<3>().maxCoeff() <= kCounted * kCounted) return covariance;
+  std::vector<Loading> root{root_of(covariance)};
+  bound_rotations(root);
+  return root[0] * root[0].transpose();
+}
 
 int unknown_rotations(const Loading& root) { return 3 - axes_of(root).known; }
 

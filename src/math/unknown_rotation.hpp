@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "tfdude/math/belief.hpp"
 
 namespace tfdude {
@@ -19,5 +21,14 @@ struct Measured {
 /// does the covariance of that in A's axes. Otherwise the logarithm of their difference would turn
 /// and stretch the translation by a rotation that nobody has measured.
 [[nodiscard]] Measured with_unknown_rotation_of(const Pose& X_AB, const Measured& Z_AB);
+
+/// Loadings of edges, each column of which is an independent error: those that turn an edge by more
+/// than 100 rad do so by 100 rad, and move all else by as much less. Either says of an angle that
+/// nothing is known, but over a lever of the Earth's radius the larger ones would leave no digit of
+/// what is known to a centimetre. O(elements).
+/// @param loadings  all with the same columns
+void bound_rotations(std::vector<Loading>& loadings);
+/// The same of a covariance, of which nothing changes otherwise.
+[[nodiscard]] Matrix6d with_bounded_rotations(const Matrix6d& covariance);
 
 }  // namespace tfdude

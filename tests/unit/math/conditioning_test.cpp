@@ -233,6 +233,57 @@ TEST_CASE("conditioning: a measurement of a path hardly known is possible") {
   }
 }
 
+// utm -> map <- base of a planar robot. Beside the least cost and the inverse Gauss-Newton matrix
+// there, with 50 digits: those are the same for all deviations of an angle that is not known.
+TEST_CASE(
+    "conditioning: whatever is said of an angle that is not known, the rest keeps its digits") {
+  const double unknown = GENERATE(10.0, 100.0, 1e3, 1e5, 1e6, 1e9);
+  CAPTURE(unknown);
+  const auto at = [](double x, double y, double z, double yaw) {
+    const Pose turned = exp(Twist(yaw * Twist::Unit(5)));
+    return Pose::trusted(turned.rotation(), {x, y, z});
+  };
+  const auto sigma = [](double x, double y, double z, double roll, double pitch, double yaw) {
+    Twist all;
+    all << x, y, z, roll, pitch, yaw;
+    return all;
+  };
+  const Transform utm{at(-4567890, -5678901, 0, 0),
+                      of_deviations(sigma(0.1, 0.1, 0.1, 0.001, 0.001, 0.01))};
+  const Transform base{at(10, 5, 0, 0.3),
+                       of_deviations(sigma(0.1, 0.1, 1e3, unknown, unknown, 0.05))};
+  const Transform Z{at(4567900.3, 5678906.2, 0.1, 0.31),
+                    of_deviations(sigma(0.02, 0.02, 0.05, 0.01, 0.01, 0.01))};
+  const Twist of_base = sigma(1.6926, 1.4903, 702.67, 0.0092702, 0.0081684, 0.0098058);
+  const Twist of_path = sigma(0.019999, 0.02, 0.05, 0.0092102, 0.0080914, 0.0098058);
+  const bool of_source = GENERATE(false, true);
+  CAPTURE(of_source);
+  // Beside a source, what the path keeps is a difference, which loses some digits.
+  const double tolerance = of_source ? 0.03 : 0.001;
+  const auto is = [&](const Covariance& found, const Twist& right) {
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      CAPTURE(i);
+      CHECK(found.stddev()[static_cast<std::size_t>(i)] ==
+            testing::Approx(right[i]).epsilon(tolerance));
+    }
+  };
+  std::vector<ObservedEdge> edges{edge_of(utm), edge_of(base)};
+  edges[0].way = ObservedEdge::Way::kUp;
+  if (of_source) {
+    // One of the angles errs by a source.
+    edges[1].X_PC.common_errors = {{"q", false, Loading(unknown * Twist::Unit(3))}};
+    edges[1].X_PC.own = of_deviations(sigma(0.1, 0.1, 1e3, 0, unknown, 0.05));
+  }
+  const auto observed = observe(edges, Z, kSource, {1.0, true});
+  REQUIRE(observed);
+  CHECK(observed->accepted);
+  CHECK(observed->distance_squared == testing::Approx(0.1765).epsilon(0.01));
+  const Belief up = inverse(observed->edges[0].X_PC);
+  const Belief path = compose(up, observed->edges[1].X_PC, Order::kSecond);
+  is(collapse(path).covariance.of_specified(), of_path);
+  is(collapse(observed->edges[1].X_PC).covariance.of_specified(), of_base);
+}
+
 TEST_CASE("conditioning: an unspecified edge takes exactly what the measurement says") {
   Random random(906);
   INFO("seed " << random.seed());
