@@ -130,10 +130,8 @@ Result<Task::Next> HandOverTask::take(std::vector<Reply> replies, Clock::time_po
                 is_last_ ? HandOverRequest{Step::kEnd, to_} : next_);
       return Next::kAsk;
     case State::kConfirm:
-      if (error == nullptr) {
-        return fail(Errc::kAlreadyExists,
-                    "frame " + quote(id_) + " belongs to partition " + quote(to_) + " already");
-      }
+      had_it_ = error == nullptr;
+      if (had_it_) return Next::kDone;
       return fail(error->code == Errc::kChangedMeanwhile ? Errc::kNotOwner : error->code,
                   error->message);
     case State::kEnd:

@@ -33,6 +33,8 @@ class HandOverTask final : public Task {
   [[nodiscard]] bool changes() const override { return true; }
   [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point now) override;
   [[nodiscard]] Milliseconds pause() const override { return pause_; }
+  /// Once it is done: the frame belonged to the new owner before, so that it is where it was.
+  [[nodiscard]] bool had_it() const { return had_it_; }
 
  private:
   enum class State : std::uint8_t { kConfirm, kBegin, kRead, kGive, kEnd, kCancel };
@@ -61,6 +63,7 @@ class HandOverTask final : public Task {
   LamportTime lamport_time_ = 0;
   HandOverRequest next_;  // to read
   bool is_last_ = false;  // the part that was given
+  bool had_it_ = false;
   Error why_;             // it is cancelled
 };
 

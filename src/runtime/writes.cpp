@@ -85,8 +85,7 @@ Result<void> Writes::hand_over(const std::string& id, const std::string& partiti
   const Deadline deadline = discovery_.call_deadline();
   HandOverTask task(structure_.forest, id, partition, parent, X_PC, deadline.at());
   auto done = requests_.run(task, deadline);
-  if (done || done.error().code != Errc::kAlreadyExists) return done;
-  return parent ? move(id, {*parent, X_PC}, deadline) : Result<void>();
+  return done && task.had_it() && parent ? move(id, {*parent, X_PC}, deadline) : done;
 }
 
 template <class Edge>

@@ -2,6 +2,7 @@
 // and later participants have.
 
 #include <atomic>
+#include <chrono>
 #include <string>
 #include <thread>
 #include <vector>
@@ -82,9 +83,11 @@ TEST_CASE("handover: to another parent in the same step") {
   REQUIRE(arms.arm1->hand_over("gripper", "arm1", "flange1"));
   REQUIRE(is_settled(arms, "arm1"));
   for (Client* one : arms.clients()) CHECK(testing::x_of(one->lookup("flange1", "gripper")) == 2);
-  // There is nothing to do but to move it.
+  // There is nothing to do but to move it, and nothing to wait for.
+  const auto begin = std::chrono::steady_clock::now();
   REQUIRE(arms.client->hand_over("gripper", "arm1"));
   REQUIRE(arms.client->hand_over("gripper", "arm1", "base1"));
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(2));
   CHECK(arms.client->parent("gripper").value() == "base1");
   REQUIRE(arms.arm1->hand_over("gripper", "arm2"));
   REQUIRE(is_settled(arms, "arm2"));

@@ -159,6 +159,10 @@ TEST_CASE("absences: a client that starts after a loss knows the frames of the l
     const auto X = client->lookup("world", "tool");
     REQUIRE_FALSE(X);
     CHECK(X.error().partition == "arm");
+    const auto many = client->lookup_many({{"world", "arm"}, {"world", "world"}}, {});
+    REQUIRE_FALSE(many[0]);
+    CHECK(many[0].error().code == Errc::kUnreachable);
+    CHECK(many[1]);
     // The late one first hears only that it is silent.
     Explanation why;
     CHECK(eventually([&] {
