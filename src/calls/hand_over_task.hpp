@@ -64,7 +64,7 @@ class HandOverTask final : public Task {
   HandOverRequest next_;  // to read
   bool is_last_ = false;  // the part that was given
   bool had_it_ = false;
-  Error why_;             // it is cancelled
+  Error why_;  // it is cancelled
 };
 
 }  // namespace tfdude
