@@ -23,17 +23,23 @@ def run(*arguments, **more_environment):
     return program.stdout
 
 
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """What mypy has found out of NumPy and of the package."""
+    return tmp_path_factory.mktemp("mypy")
+
+
 def test_stubs_are_those_of_the_module():
     run("-m", "mypy.stubtest", "tfdude", "--allowlist", TESTS / "stubtest_allowlist.txt", "--ignore-unused-allowlist")
 
 
-def test_strict_types(tmp_path):
-    run("-m", "mypy", "--strict", "--cache-dir", tmp_path, "-p", "tfdude")
+def test_strict_types(cache):
+    run("-m", "mypy", "--strict", "--cache-dir", cache, "-p", "tfdude")
     examples = sorted(EXAMPLES.glob("*.py"))
-    run("-m", "mypy", "--strict", "--cache-dir", tmp_path, "--config-file", TESTS / "mypy.ini", *examples)
+    run("-m", "mypy", "--strict", "--cache-dir", cache, "--config-file", TESTS / "mypy.ini", *examples)
 
 
-def test_types_find_mistakes(tmp_path):
+def test_types_find_mistakes(cache, tmp_path):
     wrong = tmp_path / "wrong.py"
     wrong.write_text(
         "import tfdude\n"
@@ -42,7 +48,7 @@ def test_types_find_mistakes(tmp_path):
         "tfdude.Transform().translation = 1\n"
     )
     program = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path, wrong],
+        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", cache, wrong],
         capture_output=True,
         text=True,
         env=dict(os.environ, MYPYPATH=os.environ["PYTHONPATH"]),
