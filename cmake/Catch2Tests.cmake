@@ -34,7 +34,7 @@ endfunction()
 # The output of Catch2 2 and 3 if a filter matches no test case; Catch2 2 still exits with success.
 set(TFDUDE_NOTHING_RAN "No test cases matched|No tests ran")
 
-# tfdude_join_tests(target files): names of sources. With TFDUDE_UNITY (cmake/Unity.cmake), tests are compiled eight at
+# tfdude_join_tests(target files): names of sources. With TFDUDE_UNITY (cmake/Unity.cmake), tests are compiled sixteen
 # once, by files in the build tree that take their place.
 function(tfdude_join_tests target files)
   if(NOT TFDUDE_UNITY)
@@ -46,7 +46,7 @@ function(tfdude_join_tests target files)
   list(FILTER tests INCLUDE REGEX "_test\\.cpp$")
   list(TRANSFORM tests PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
   while(tests)
-    list(SUBLIST tests 0 8 together)
+    list(SUBLIST tests 0 16 together)
     list(REMOVE_ITEM tests ${together})
     list(LENGTH tests left)
     list(LENGTH together count)
