@@ -10,6 +10,7 @@
 #include "math/instant_sources.hpp"
 #include "math/joint_covariance.hpp"
 #include "math/joint_update.hpp"
+#include "math/left_columns.hpp"
 #include "math/semidefinite.hpp"
 #include "math/square_root.hpp"
 
@@ -148,39 +149,6 @@ std::vector<Loading> lessened(const JointPrior::Source& source, const std::vecto
   return loadings;
 }
 
-// Whether a source is of columns that observations have left.
-bool is_left(const JointPrior::Source& source) {
-  return is_observed({source.name, false, {}}) && said_source(source.name).empty();
-}
-
-// How many there are; zero: few, or some that subtract.
-Eigen::Index many_columns(const JointPrior& prior) {
-  Eigen::Index count = 0;
-  for (const JointPrior::Source& source : prior.sources()) {
-    if (!is_left(source)) continue;
-    if (source.subtracts) return 0;
-    count += source.loadings.front().cols();
-  }
-  return count > kMaxLoadingColumns ? count : 0;
-}
-
-// Those of all edges, 6n x count.
-Matrix columns_of(const JointPrior& prior, Eigen::Index count) {
-  Matrix all(6 * static_cast<Eigen::Index>(prior.edges().size()), count);
-  Eigen::Index first = 0;
-  for (const JointPrior::Source& source : prior.sources()) {
-    if (!is_left(source)) continue;
-    const Eigen::Index columns = source.loadings.front().cols();
-    Eigen::Index row = 0;
-    for (const Loading& loading : source.loadings) {
-      all.block(row, first, 6, columns) = loading;
-      row += 6;
-    }
-    first += columns;
-  }
-  return all;
-}
-
 void give_many(const JointPrior& prior, JointCovariance& joint, Eigen::Index before,
                const std::string& name, std::vector<CorrectedError>& edges) {
   forget_least(prior, joint, edges);
@@ -271,7 +239,7 @@ std::vector<CorrectedError> corrected_many(const JointPrior& prior, const Linear
   for (const std::size_t k : prior.edges()) H.push_back(linear.H[k]);
   const Twist rounding = rounding_of_pose(linear.reach);
   const Loading noise = compressed(joined(R, Matrix6d(rounding.asDiagonal())));
-  MeasuredJoint found = measured_joint(prior.own_roots(), columns_of(prior, before), H, noise);
+  MeasuredJoint found = measured_joint(prior.own_roots(), left_columns(prior, before), H, noise);
   std::vector<CorrectedError> corrected;
   for (const Matrix6d& own : found.own) corrected.push_back({own, {}});
   JointCovariance observed(count);
@@ -348,7 +316,7 @@ std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const Line
   const auto& edges = prior.edges();
   const auto& H = linear.H;
   const bool alone = edges.size() == 1;
-  const Eigen::Index many = merge && !alone ? many_columns(prior) : 0;
+  const Eigen::Index many = merge && !alone ? many_left_columns(prior) : 0;
   if (many > 0) return corrected_many(prior, linear, R, many, new_source);
   const Twist rounding = rounding_of_pose(linear.reach);
   const Factor S(joined(prior.path(H), R), rounding);
@@ -395,7 +363,7 @@ std::vector<CorrectedError> determined_errors(const JointPrior& prior, std::size
                                               const LinearPath& linear, const Loading& R,
                                               const std::string& new_source, bool merge) {
   const Matrix6d G = inverse_of(linear.H[u]);
-  if (const Eigen::Index many = merge ? many_columns(prior) : 0; many > 0) {
+  if (const Eigen::Index many = merge ? many_left_columns(prior) : 0; many > 0) {
     return determined_many(prior, linear, G, G * R, many, new_source);
   }
   Left left{JointCovariance(prior.edges().size() + 1), {}};
