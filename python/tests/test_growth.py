@@ -38,7 +38,7 @@ def use(client: tfdude.Client) -> None:
     del watch, subscription, events, stream
 
 
-def check(cycle, cycles: int, warm_up: int, bytes_per_cycle: float, once: float = 4e5) -> None:
+def check(cycle, cycles: int, warm_up: int, bytes_per_cycle: float, once: float = 1e6) -> None:
     """@param once  [bytes] that may be kept whatever the number of cycles"""
     for _ in range(warm_up):
         cycle()

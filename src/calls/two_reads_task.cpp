@@ -18,8 +18,10 @@ bool are_same(const Transform& X, const Transform& Y) {
          X.covariance.complete() == Y.covariance.complete();
 }
 
+// What was read in memory names no process, and counts for itself.
 bool is_before(const SegmentValues& earlier, const SegmentValues& later) {
-  return earlier.incarnation == later.incarnation && earlier.commit <= later.commit;
+  const bool of_both = (earlier.incarnation == 0) != (later.incarnation == 0);
+  return of_both || (earlier.incarnation == later.incarnation && earlier.commit <= later.commit);
 }
 
 }  // namespace
@@ -71,6 +73,8 @@ Result<Task::Next> TwoReadsTask::take(std::vector<Reply> replies, Clock::time_po
 }
 
 bool TwoReadsTask::are_of_one_state() const {
+  // States that are meant to be two.
+  if (reads_[0].query.believed_at != reads_[1].query.believed_at) return true;
   for (std::size_t i = 0; i < answers_[0].size(); ++i) {
     for (std::size_t k = 0; k < answers_[1].size(); ++k) {
       if (plans_[0].parts[i].owner != plans_[1].parts[k].owner) continue;

@@ -88,6 +88,7 @@ WaitingLookup::Answer WaitingLookup::go_on_asking(const Shared& shared, const Ne
   }
   auto found = plan_->take(asking_->take_replies(), shared.hints, now);
   asking_.reset();
+  if (found && *found) shared.host.asked(plan_->parts());
   return found ? judge(shared, news, *std::move(found), true, now) : ask(shared, news, true, now);
 }
 

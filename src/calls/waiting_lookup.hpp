@@ -34,6 +34,8 @@ class LookupHost {
   /// The error to return at the time limit: that of the last attempt, or that the result is not
   /// certain.
   [[nodiscard]] virtual Error last_word(Error last, const TimeLimit& limit) = 0;
+  /// The owners have answered these parts of a lookup.
+  virtual void asked(const std::vector<Part>& parts) { (void)parts; }
   /// The clock of sources that stamp samples; nothing if its time is not known.
   [[nodiscard]] virtual std::optional<Time> clock() const = 0;
 };

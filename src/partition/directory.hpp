@@ -216,7 +216,7 @@ class Directory {
   /// The partitions that this participant misses, for its presence.
   [[nodiscard]] std::vector<Absent> absent() const { return absences_.all(); }
 
-  /// A partition that others miss, and of which nothing else is known here.
+  /// A partition that is missed, and not all frames of which have come here.
   [[nodiscard]] std::optional<PartitionInfo> only_heard_of() const;
 
   /// Changes with everything beside the forest's structure that a plan depends on: which partitions

@@ -347,9 +347,11 @@ std::vector<Owner> Directory::reachable_owners() const {
 }
 
 std::optional<PartitionInfo> Directory::only_heard_of() const {
-  const auto one = std::find_if(
-      partitions_.begin() + 1, partitions_.end(),
-      [](const Known& partition) { return partition.live == 0 && partition.listed(); });
+  const auto lacks = [&](const Known& partition) {
+    const bool is_cut_off = !without_pages_ && !partition.info.reachable && !partition.complete();
+    return (partition.live == 0 || is_cut_off) && partition.listed();
+  };
+  const auto one = std::find_if(partitions_.begin() + 1, partitions_.end(), lacks);
   if (one == partitions_.end()) return std::nullopt;
   return one->info;
 }

@@ -95,7 +95,9 @@ Error Discovery::ended_error(const Error& error) const {
 }
 
 Result<void> Discovery::nobody_but_excluded() const {
-  if (ended_) return tl::unexpected(ended_error({Errc::kTimeout, "not all frames are known"}));
+  if (ended_unaware()) {
+    return tl::unexpected(ended_error({Errc::kTimeout, "not all frames are known"}));
+  }
   const auto excluded = transport_.excluded();
   if (excluded.empty()) return {};
   const Lock lock(structure_.mutex);
@@ -125,7 +127,7 @@ void Discovery::wait_for_change(const Deadline& deadline) {
 }
 
 Error Discovery::explained(Error error) {
-  if (ended_) return ended_error(error);
+  if (ended_unaware()) return ended_error(error);
   // Before the lock is taken: the transport has a lock of its own.
   if (const auto strangers = transport_.incompatible(); !strangers.empty()) {
     return {Errc::kIncompatible,
@@ -147,7 +149,7 @@ Error Discovery::explained(Error error) {
           error.message + (between ? "; what connects them" : "; it") +
               " may belong to partition " + quote(missed->name) +
               ", which has not been reachable since " + to_string(missed->since) +
-              ", before this process started: it " + why_absent(*missed),
+              ", and not all of its frames are known here: it " + why_absent(*missed),
           error.frame, missed->name};
 }
 

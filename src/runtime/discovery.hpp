@@ -30,6 +30,11 @@ class Discovery {
   /// since, are known; or the client ends, so that no more is learned.
   [[nodiscard]] bool complete();
 
+  /// Whether it ends before everything is known, so that unknown frames may exist.
+  [[nodiscard]] bool ended_unaware() const {
+    return ended_ && !complete_.load(std::memory_order_relaxed);
+  }
+
   /// A change that an owner announced did not come in time: until it has, unknown frames may exist.
   /// For callers that hold the structure's lock.
   void fell_behind() { complete_.store(false, std::memory_order_relaxed); }

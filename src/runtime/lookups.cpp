@@ -34,13 +34,9 @@ Result<LookupInProgress> Lookups::plan(const WantedLookup& wanted) {
       !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
-  auto planned = [&] {
-    const Lock lock(structure_.mutex);
-    return LookupInProgress::plan(structure_.forest, structure_.directory, structure_.clock.kind(),
-                                  wanted, hints_, Deadline::Clock::now());
-  }();
-  if (planned) asked(planned->parts());
-  return planned;
+  const Lock lock(structure_.mutex);
+  return LookupInProgress::plan(structure_.forest, structure_.directory, structure_.clock.kind(),
+                                wanted, hints_, Deadline::Clock::now());
 }
 
 Result<StampedTransform> Lookups::elsewhere(std::string_view a, std::string_view b,

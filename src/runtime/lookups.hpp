@@ -81,8 +81,8 @@ class Lookups final : private LookupHost {
                                                             const std::string& b,
                                                             const Query& query, Milliseconds wait);
 
-  /// Owners were asked for these: the memory of those on this computer is read from now on.
-  void asked(const std::vector<Part>& parts) {
+  /// Owners have answered these: the memory of those on this computer is read from now on.
+  void asked(const std::vector<Part>& parts) override {
     if (memory_ != nullptr) memory_->asked(parts);
   }
 

@@ -34,8 +34,11 @@ std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<Frame
   if (!asked && (task.settle(asked.error()) || (in_time && asked.error().code == Errc::kTimeout))) {
     asked = requests_.run(task, deadline);
   }
-  lookups_.asked(task.parts());
-  if (!asked) task.fail_all(asked.error());
+  if (asked) {
+    lookups_.asked(task.parts());
+  } else {
+    task.fail_all(asked.error());
+  }
   for (Found& one : task.found()) {
     const bool is_missing = asked && !one && may_appear(one.error().code);
     if (is_missing) one = tl::unexpected(discovery_.explained(std::move(one.error())));

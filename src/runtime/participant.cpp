@@ -194,7 +194,7 @@ std::optional<Reply> Participant::answer_query(const Request& request,
 // What it does not know must not exist.
 Reply Participant::answer_frames(const Request& request) {
   Reply reply{request.sequence, 0, Done{}};
-  if (member_.out() || !discovery_.complete()) {
+  if (member_.out() || !discovery_.complete() || discovery_.ended_unaware()) {
     reply.body = Error{Errc::kNotYet,
                        "partition " + quote(member_.name()) + " has not discovered all others yet"};
     return reply;

@@ -37,9 +37,11 @@ void PendingLookups::stop() {
   stopped_.notify_all();
   attends_.stop();
   shared_.forest.on_commit(nullptr, this);
-  All left = std::exchange(all_, {});
+  All left;
   {
+    // Several threads may stop it.
     const Lock lock(mutex_);
+    left = std::exchange(all_, {});
     std::move(added_.begin(), added_.end(), std::back_inserter(left));
     added_.clear();
   }

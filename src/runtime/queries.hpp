@@ -50,7 +50,7 @@ class Queries {
  private:
   [[nodiscard]] Result<std::vector<Frame>> frames(const Deadline& deadline);
   [[nodiscard]] Result<std::vector<Frame>> followed(const Deadline& deadline);
-  /// Whether no partition was lost before this process started.
+  /// Whether no partition was lost before all of its frames were known here.
   [[nodiscard]] bool knows_all();
   /// Of the wanted frames those that owners know, if a partition was lost before this process
   /// started.

@@ -75,8 +75,8 @@ class WatchClient final : private WatchLink {
   void wait_for_commits();
   [[nodiscard]] Result<std::shared_ptr<WatchedPath>> follow(std::shared_ptr<WatchedPath> path,
                                                             const Deadline& deadline);
-  /// kTimeout, naming the owners.
   [[nodiscard]] Result<WatchRoute> route_of(const WatchedPath& path);
+  /// kTimeout, naming the owners.
   [[nodiscard]] tl::unexpected<Error> unanswered(const WatchedPath& path, const Deadline& deadline);
 
   const Context context_;

@@ -144,7 +144,7 @@ bool take(const Bytes& bytes) {
   edge.samples[2].made_up = true;
   edge.samples[3].is_row = true;
   edge.samples[3].revision =
-      SampleRevision{random.transform(), correlation(random), {true, true, 255, 3, 2}};
+      SampleRevision{random.transform(), correlation(random), {true, true, 255, Told::kNot, 3, 2}};
   part.edges.push_back(edge);
   fixed.id = "cleared";
   fixed.state = HandedState::kCleared;

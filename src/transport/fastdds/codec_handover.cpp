@@ -133,8 +133,12 @@ void write_row(const SampleRevision& revision, std::uint32_t sample, wire::Hande
 }
 
 Result<void> read_row(const wire::HandedRow& wire, SampleRevision& revision, const Place& place) {
-  revision.row = {(wire.flags() & kRowObserved) != 0, (wire.flags() & kRowBetween) != 0,
-                  wire.lasts(), wire.follows(), wire.before()};
+  revision.row = {(wire.flags() & kRowObserved) != 0,
+                  (wire.flags() & kRowBetween) != 0,
+                  wire.lasts(),
+                  Told::kNot,
+                  wire.follows(),
+                  wire.before()};
   auto ok = OwnedTransform::read(wire.given(), revision.given, place);
   return ok ? AnyCorrelation::read(wire.row_correlation(), revision.correlation, place) : ok;
 }

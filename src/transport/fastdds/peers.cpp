@@ -124,11 +124,9 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   const auto known = servers_.find(peer_of(prefix));
   if (known == servers_.end()) return;
   life_signs_->forget(known->first);
-  const Server& server = known->second;
-  const bool is_news = server.said() != nullptr && !server.silent;
-  const Presence said = is_news ? *server.said() : Presence();
+  Server& server = known->second;
+  if (server.said() != nullptr && !std::exchange(server.silent, true)) lose(server, {});
   servers_.erase(known);
-  if (is_news) lose(said, {});
   note_doubts();
   any_overtaken_ = std::any_of(servers_.begin(), servers_.end(),
                                [](const auto& one) { return one.second.overtaken; });
@@ -144,6 +142,7 @@ void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
     server.by_page->partition = page.partition;
     server.by_page->incarnation = page.incarnation;
   }
+  server.served = true;
   hear(server, Clock::now());
 }
 
@@ -154,6 +153,7 @@ void Peers::present(const ertps::GuidPrefix_t& prefix, const Presence& presence,
   server.peers = peers;
   server.heard.last = Clock::now();
   server.heard.present = true;
+  server.served = server.served || presence.serving;
   if (!std::exchange(server.silent, false) && server.presence == presence) return;
   server.presence = presence;
   overtake(presence);
@@ -198,7 +198,7 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
     if (silence.kind != Silence::Kind::kLost) continue;
     server.silent = true;
     server.doubted_since.reset();
-    lose(*said, silence.early);
+    lose(server, silence.early);
   }
   note_doubts();
   if (ask_rivals) unheard.push_back(own_);
@@ -220,10 +220,11 @@ bool Peers::is_heard(const std::string& partition) const {
   });
 }
 
-void Peers::lose(const Presence& said, Clock::duration early) {
-  if (!is_heard(said.partition) && untold_.size() < kMostUntold) {
-    untold_[said.partition] = Clock::now();
-  }
+// Nobody misses who only claimed a name, or a rival here.
+void Peers::lose(const Server& server, Clock::duration early) {
+  const Presence& said = *server.said();
+  const bool is_missed = server.served && said.partition != own_ && !is_heard(said.partition);
+  if (is_missed && untold_.size() < kMostUntold) untold_[said.partition] = Clock::now();
   gone_(said, early);
 }
 

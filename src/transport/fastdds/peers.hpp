@@ -151,6 +151,7 @@ class Peers {
     std::size_t peers = 0;
     Hearing heard{Clock::now()};
     bool silent = false;
+    bool served = false;     // it did more than claim its name
     bool overtaken = false;  // a later process has served its partition
     // It says that it serves the own partition, and has not shown it.
     std::optional<Clock::time_point> doubted_since;
@@ -174,8 +175,8 @@ class Peers {
   /// Reports a rival that did not answer in time as gone. @return whether one must be asked
   bool ask_rival(Server& server, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
   void note_doubts() TFDUDE_REQUIRES(mutex_);
-  /// Reports that the server of this presence has left or is silent.
-  void lose(const Presence& said, Clock::duration early) TFDUDE_REQUIRES(mutex_);
+  /// Reports that a server has left or is silent. Call when it is no longer heard.
+  void lose(const Server& server, Clock::duration early) TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool is_heard(const std::string& partition) const TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] bool all_present() const TFDUDE_REQUIRES(mutex_);
   /// Whether all that this client hears is who only claims a partition yet.

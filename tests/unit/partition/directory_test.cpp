@@ -205,6 +205,20 @@ TEST_CASE("the loss of an unknown partition or of an earlier incarnation is igno
   CHECK(replica.directory.reachable(*replica.directory.owner("arms")));
 }
 
+TEST_CASE("of a partition that is lost before all its pages have arrived more may exist") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 2), kNow);
+  replica.directory.apply(Page{"arms", 0, 1, 0, {{"hand", ""}}});
+  CHECK_FALSE(replica.directory.only_heard_of());
+  replica.directory.lost("arms", 1, kLater);
+  REQUIRE(replica.directory.only_heard_of());
+  CHECK(replica.directory.only_heard_of()->name == "arms");
+  replica.directory.apply(presence_of("arms", 1, 2), kLater);
+  replica.directory.apply(Page{"arms", 1, 1, 0, {{"tool", "hand"}}});
+  replica.directory.lost("arms", 1, kLater);
+  CHECK_FALSE(replica.directory.only_heard_of());
+}
+
 TEST_CASE("a new incarnation replaces the old one when all its pages have arrived") {
   const Lines old{"hand <  @ arms", "tool < hand @ arms, attached"};
   Replica replica;

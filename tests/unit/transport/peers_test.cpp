@@ -292,6 +292,17 @@ TEST_CASE("a server that is gone counts until it is announced as missed") {
     one.peers.left(prefix_of(2));
     CHECK(one.peers.count({"head"}) == 1);
   }
+  SECTION("who only claimed a name, or the own one, is missed by nobody") {
+    one.peers.serve("legs");
+    one.meet(3, "legs");
+    one.peers.left(prefix_of(3));
+    one.peers.met(peer_of(prefix_of(4)), serving("tool"));
+    Presence claim = presence_of("tool");
+    claim.serving = false;
+    one.peers.present(prefix_of(4), claim, 0);
+    one.peers.left(prefix_of(4));
+    CHECK(one.peers.count({}) == 2);
+  }
   SECTION("an earlier process of a partition is missed by nobody") {
     one.meet(3, "arms");
     one.peers.left(prefix_of(1));
