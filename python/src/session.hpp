@@ -83,14 +83,25 @@ class Session {
   template <class Function>
   auto call(const Function& function) const {
     std::shared_ptr<Client> client = this->client();
-    return without_gil([&] {
+    auto answer = without_gil([&] {
       auto result = function(*client);
       client.reset();
       return result;
     });
+    if (closed()) say_closed(answer);
+    return answer;
   }
 
  private:
+  /// A wait that has ended with the client says so in the same words, whatever it waited for.
+  template <class T>
+  static void say_closed(Result<T>& result) {
+    const bool ended = !result && result.error().code == Errc::kTransport;
+    if (ended) result = tl::unexpected(closed_error());
+  }
+  template <class T>
+  static void say_closed(T&) {}
+
   std::shared_ptr<Client> client_;  // guarded by the GIL
   Milliseconds timeout_;
   std::string partition_;
