@@ -187,9 +187,11 @@ TEST_CASE("participant: it serves and watches and waits and listens on six named
   REQUIRE(head.add("later", "head", {}));
   REQUIRE(waiting.get());
   REQUIRE(eventually([&] { return heard >= 6; }));
-  // Beside the transport's. The other one, whose edges are watched, pushes; each has memory to pass or to read.
+  // Beside the transport's. The other one, whose edges are watched, pushes. Each has memory to pass
+  // or to read.
   const std::multiset<std::string> expected{"tfdude-ask",    "tfdude-callback", "tfdude-calls",
-                                            "tfdude-memory", "tfdude-push",     "tfdude-push"};
+                                            "tfdude-memory", "tfdude-memory",   "tfdude-push",
+                                            "tfdude-push"};
   CHECK(eventually([&] {
     auto begun = thread_names();
     for (const std::string& name : before) {
