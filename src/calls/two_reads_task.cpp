@@ -7,16 +7,10 @@
 #include "tfdude/base/id.hpp"
 
 #include "calls/lookup_in_progress.hpp"
+#include "tree/pushed_value.hpp"
 
 namespace tfdude {
 namespace {
-
-bool are_same(const Transform& X, const Transform& Y) {
-  return X.pose.translation() == Y.pose.translation() &&
-         X.pose.rotation().coeffs() == Y.pose.rotation().coeffs() &&
-         X.covariance.of_specified().upper() == Y.covariance.of_specified().upper() &&
-         X.covariance.complete() == Y.covariance.complete();
-}
 
 // What was read in memory names no process, and counts for itself.
 bool is_before(const SegmentValues& earlier, const SegmentValues& later) {
@@ -100,7 +94,7 @@ bool TwoReadsTask::is_first_unchanged(const Answers& again) const {
       if (!is_before(first, second) || !is_before(second, again[i])) return false;
     }
     if (!std::equal(first.values.begin(), first.values.end(), again[i].values.begin(),
-                    again[i].values.end(), are_same)) {
+                    again[i].values.end(), same)) {
       return false;
     }
   }
