@@ -128,8 +128,8 @@ void Peers::left(const ertps::GuidPrefix_t& prefix) {
   if (server.said() != nullptr && !std::exchange(server.silent, true)) lose(server, {});
   servers_.erase(known);
   note_doubts();
-  any_overtaken_ = std::any_of(servers_.begin(), servers_.end(),
-                               [](const auto& one) { return one.second.overtaken; });
+  any_silent_ = std::any_of(servers_.begin(), servers_.end(),
+                            [](const auto& one) { return one.second.silent; });
 }
 
 void Peers::sent_page(const ertps::GuidPrefix_t& prefix, const Page& page) {
@@ -196,7 +196,7 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
       unheard.push_back(said->partition);
     }
     if (silence.kind != Silence::Kind::kLost) continue;
-    server.silent = true;
+    server.silent = any_silent_ = true;
     server.doubted_since.reset();
     lose(server, silence.early);
   }
@@ -265,6 +265,12 @@ bool Peers::heard_lately(const std::string& partition) const {
   return false;
 }
 
+bool Peers::silent(const PeerId& peer) const {
+  const Lock lock(mutex_);
+  const auto known = servers_.find(peer);
+  return known != servers_.end() && known->second.silent;
+}
+
 bool Peers::replaced(const PeerId& peer) const {
   const Lock lock(mutex_);
   const auto known = servers_.find(peer);
@@ -280,7 +286,6 @@ void Peers::overtake(const Presence& later) {
       continue;
     }
     server.overtaken = true;
-    any_overtaken_ = true;
   }
 }
 

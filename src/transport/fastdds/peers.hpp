@@ -126,10 +126,13 @@ class Peers {
   /// As Transport::heard_lately().
   [[nodiscard]] bool heard_lately(const std::string& partition) const;
 
+  /// Whether a server is silent.
+  [[nodiscard]] bool silent(const PeerId& peer) const;
+  /// False while no server is silent. O(1).
+  [[nodiscard]] bool any_silent() const { return any_silent_.load(std::memory_order_relaxed); }
+
   /// Whether a server is silent, and a later process serves its partition, or has.
   [[nodiscard]] bool replaced(const PeerId& peer) const;
-  /// False while replaced() holds for nobody. O(1).
-  [[nodiscard]] bool any_replaced() const { return any_overtaken_.load(std::memory_order_relaxed); }
 
   /// Whether another process may serve this participant's partition since this one could not run:
   /// then no change may be accepted until that is decided. O(1) while nobody says so.
@@ -195,7 +198,7 @@ class Peers {
   // Partitions whose loss was reported, and when: they count until they are announced as missed.
   std::map<std::string, Clock::time_point, std::less<>> untold_ TFDUDE_GUARDED_BY(mutex_);
   std::atomic<bool> any_incompatible_{false};
-  std::atomic<bool> any_overtaken_{false};
+  std::atomic<bool> any_silent_{false};  // or was, and is heard again
   Clock::time_point last_met_ TFDUDE_GUARDED_BY(mutex_){};
   Clock::time_point last_look_ TFDUDE_GUARDED_BY(mutex_) = Clock::now();
   std::string own_ TFDUDE_GUARDED_BY(mutex_);  // the partition served here; empty: none yet

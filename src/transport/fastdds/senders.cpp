@@ -87,13 +87,14 @@ Result<void> Senders::await_match(Writer& writer, const std::string& partition, 
   if (!writer.good()) return writer.check();
   parts_.attention.pay(writer);
   const auto step = [deadline] { return std::min(deadline, Peers::Clock::now() + kWaitStep); };
-  // What a former process alone would get would be lost.
+  // What a former process alone would get would be lost. A later one may have sent its frames
+  // before it says that it serves.
   const auto reaches = [&] {
     if (!writer.wait_until_matched(step())) return false;
-    if (!parts_.peers.any_replaced()) return true;
+    if (!parts_.peers.any_silent()) return true;
     const auto readers = writer.readers();
-    const auto is_former = [&](const PeerId& peer) { return parts_.peers.replaced(peer); };
-    if (!std::all_of(readers.begin(), readers.end(), is_former)) return true;
+    const auto is_silent = [&](const PeerId& peer) { return parts_.peers.silent(peer); };
+    if (!std::all_of(readers.begin(), readers.end(), is_silent)) return true;
     writer.wait_for_readers(step());
     return false;
   };

@@ -115,11 +115,18 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   const auto replaced = [&](unsigned char number) {
     return one.peers.replaced(peer_of(prefix_of(number)));
   };
+  const auto silent = [&](unsigned char number) {
+    return one.peers.silent(peer_of(prefix_of(number)));
+  };
   one.meet(1, "arms");
   one.meet(2, "head");
   CHECK_FALSE(replaced(1));
+  CHECK_FALSE(one.peers.any_silent());
   one.look(std::chrono::seconds(3));
   REQUIRE(one.peers.silent("arms"));
+  CHECK(one.peers.any_silent());
+  CHECK(silent(1));
+  CHECK_FALSE(silent(4));  // unknown
   CHECK_FALSE(replaced(1));
   Presence later = presence_of("arms");
   later.incarnation = 2;
@@ -131,6 +138,8 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   CHECK(replaced(1));
   CHECK_FALSE(replaced(2));  // of another partition
   CHECK_FALSE(replaced(3));
+  CHECK_FALSE(silent(3));
+  CHECK(silent(1));
   CHECK_FALSE(replaced(4));  // unknown
   // The later process has left again.
   one.peers.left(prefix_of(3));
@@ -138,6 +147,9 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   // The earlier one was only paused.
   one.peers.present(prefix_of(1), presence_of("arms"), 0);
   CHECK_FALSE(replaced(1));
+  CHECK_FALSE(silent(1));
+  one.peers.left(prefix_of(2));
+  CHECK_FALSE(one.peers.any_silent());
 }
 
 TEST_CASE("a rival for the own partition is reported once it has answered") {
