@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "tfdude/base/id.hpp"
@@ -74,6 +75,24 @@ Span span_of(const Cursor& cursor) {
     span.last = std::max(span.last.value_or(end), end);
   }
   return span;
+}
+
+bool is_same_way(const std::vector<EdgeFromFixed>& one, const std::vector<EdgeFromFixed>& other) {
+  return std::equal(one.begin(), one.end(), other.begin(), other.end(),
+                    [](const EdgeFromFixed& a, const EdgeFromFixed& b) {
+                      return a.id == b.id && a.up == b.up;
+                    });
+}
+
+// Of edges that are on both ways, if the way to the earlier instant is not to be had any more in the
+// state of the later one: what has no history was all the time as it is by then.
+void take_what_rests(const std::vector<EdgeFromFixed>& later, std::vector<EdgeFromFixed>& earlier) {
+  for (EdgeFromFixed& edge : earlier) {
+    const auto same = std::find_if(later.begin(), later.end(),
+                                   [&](const EdgeFromFixed& one) { return one.id == edge.id; });
+    const bool rests = same != later.end() && !same->moving && !edge.moving;
+    if (rests && same->up == edge.up) edge.X_PC = same->X_PC;
+  }
 }
 
 }  // namespace
@@ -193,21 +212,34 @@ Result<StampedTransform> Recording::lookup_at(std::string_view a, std::string_vi
 Result<StampedTransform> Recording::lookup_at(std::string_view a, Time at_a, std::string_view b,
                                               Time at_b, std::string_view fixed,
                                               const Query& query) {
-  const auto edges_to = [&](std::string_view frame, const StampedTransform& X) {
+  const auto edges_to = [&](std::string_view frame, Time at, const StampedTransform& X) {
     Query then = query;
-    then.at = X.stamp;
+    then.at = X.stamp.value_or(at);
     then.believed_at.reset();  // that is the state
     return edges_from_fixed(impl_->state().forest(), fixed, frame, then);
   };
-  const auto X_FA = lookup_at(fixed, a, at_a, query);
-  if (!X_FA) return tl::unexpected(X_FA.error());
-  auto to_a = edges_to(a, *X_FA);
-  if (!to_a) return tl::unexpected(std::move(to_a.error()));
-  const auto X_FB = lookup_at(fixed, b, at_b, query);
-  if (!X_FB) return tl::unexpected(X_FB.error());
-  auto to_b = edges_to(b, *X_FB);
-  if (!to_b) return tl::unexpected(std::move(to_b.error()));
-  return over_fixed(*X_FA, *X_FB, *std::move(to_a), *std::move(to_b), query.order);
+  const bool a_is_later = at_a > at_b;
+  const auto& [first, at_first] = a_is_later ? std::tie(b, at_b) : std::tie(a, at_a);
+  const auto& [second, at_second] = a_is_later ? std::tie(a, at_a) : std::tie(b, at_b);
+  auto X_F1 = lookup_at(fixed, first, at_first, query);
+  if (!X_F1) return X_F1;
+  auto to_first = edges_to(first, at_first, *X_F1);
+  if (!to_first) return tl::unexpected(std::move(to_first.error()));
+  auto X_F2 = lookup_at(fixed, second, at_second, query);
+  if (!X_F2) return X_F2;
+  auto to_second = edges_to(second, at_second, *X_F2);
+  if (!to_second) return tl::unexpected(std::move(to_second.error()));
+  // Both ways are of the later state, in which the past may have been rewritten.
+  auto by_now = edges_to(first, at_first, *X_F1);
+  if (by_now && is_same_way(*by_now, *to_first)) {
+    to_first = std::move(by_now);
+  } else {
+    take_what_rests(*to_second, *to_first);
+  }
+  if (a_is_later) {
+    return over_fixed(*X_F2, *X_F1, *std::move(to_second), *std::move(to_first), query.order);
+  }
+  return over_fixed(*X_F1, *X_F2, *std::move(to_first), *std::move(to_second), query.order);
 }
 
 Trajectory Recording::trajectory(std::string_view a, std::string_view b,

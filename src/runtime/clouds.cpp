@@ -3,6 +3,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
 #include "tfdude/math/point.hpp"
 
 #include "math/cloud_map.hpp"
@@ -13,6 +14,10 @@
 // Clouds of points: which transforms they need, and the points themselves.
 namespace tfdude {
 namespace {
+
+// How often a trajectory is read while an edge changes that it may have, before each instant is
+// asked for by itself.
+constexpr int kMostTries = 3;
 
 // Stamps that are looked up as one.
 struct Groups {
@@ -77,35 +82,54 @@ Result<void> check(const CloudQuery& query, Eigen::Index points) {
 Result<ManyLookups::CloudPoses> ManyLookups::over_fixed(std::string_view a, std::string_view b,
                                                         const CloudQuery& query,
                                                         const std::vector<Time>& instants) {
-  CloudPoses poses;
   Query at_a = query.lookup;
   if (!at_a.at) at_a.at = *std::max_element(instants.begin(), instants.end());
-  if (query.covariances) {
-    for (const Time instant : instants) {
-      Query at_b = query.lookup;
-      at_b.at = instant;
-      const auto X_AB = two_instants_.lookup(std::string(a), at_a, std::string(b), at_b,
-                                             query.fixed, discovery_.call_deadline());
-      if (!X_AB) return tl::unexpected(X_AB.error());
-      poses.X_AB.push_back(*X_AB);
-      poses.complete = poses.complete && X_AB->covariance.complete();
-      TrajectoryBuilder::merge(X_AB->basis, poses.basis);
+  if (!query.covariances) {
+    auto poses = poses_over_fixed(a, b, query, at_a, instants);
+    if (poses || poses.error().code != Errc::kChangedMeanwhile) return poses;
+  }
+  CloudPoses poses;
+  for (const Time instant : instants) {
+    Query at_b = query.lookup;
+    at_b.at = instant;
+    const auto X_AB = two_instants_.lookup(std::string(a), at_a, std::string(b), at_b, query.fixed,
+                                           discovery_.call_deadline());
+    if (!X_AB) return tl::unexpected(X_AB.error());
+    poses.X_AB.push_back(*X_AB);
+    poses.complete = poses.complete && X_AB->covariance.complete();
+    TrajectoryBuilder::merge(X_AB->basis, poses.basis);
+  }
+  return poses;
+}
+
+// What is the same before and after the trajectory is read was so meanwhile: no point has one way
+// from before a change and the other one from after it.
+Result<ManyLookups::CloudPoses> ManyLookups::poses_over_fixed(std::string_view a,
+                                                              std::string_view b,
+                                                              const CloudQuery& query,
+                                                              const Query& at_a,
+                                                              const std::vector<Time>& instants) {
+  const std::string_view fixed = query.fixed;
+  auto X_AF = lookups_.lookup(a, fixed, at_a);
+  for (int tries = 0; X_AF && tries < kMostTries; ++tries) {
+    const auto X_FB = trajectory_once(fixed, b, instants, query.lookup);
+    if (!X_FB) return tl::unexpected(X_FB.error());
+    if (!X_FB->missing.empty()) return tl::unexpected(X_FB->missing.front().error);
+    const auto before = std::exchange(X_AF, lookups_.lookup(a, fixed, at_a));
+    if (!X_AF || X_AF->pose.matrix() != before->pose.matrix()) continue;
+    CloudPoses poses;
+    poses.complete = X_AF->covariance.complete();
+    poses.basis = X_AF->basis;
+    TrajectoryBuilder::merge(X_FB->basis, poses.basis);
+    for (const auto& one : X_FB->X_AB) {
+      poses.X_AB.push_back({X_AF->pose * one->pose, StatedCovariance()});
+      poses.complete = poses.complete && one->covariance.complete();
     }
     return poses;
   }
-  const auto X_AF = lookups_.lookup(a, std::string_view(query.fixed), at_a);
-  if (!X_AF) return tl::unexpected(X_AF.error());
-  const auto X_FB = trajectory_once(query.fixed, b, instants, query.lookup);
-  if (!X_FB) return tl::unexpected(X_FB.error());
-  if (!X_FB->missing.empty()) return tl::unexpected(X_FB->missing.front().error);
-  for (const auto& one : X_FB->X_AB) {
-    poses.X_AB.push_back({X_AF->pose * one->pose, StatedCovariance()});
-    poses.complete = poses.complete && one->covariance.complete();
-  }
-  poses.complete = poses.complete && X_AF->covariance.complete();
-  poses.basis = X_AF->basis;
-  TrajectoryBuilder::merge(X_FB->basis, poses.basis);
-  return poses;
+  if (!X_AF) return tl::unexpected(std::move(X_AF.error()));
+  return fail(Errc::kChangedMeanwhile,
+              "edges between " + quote(a) + " and " + quote(fixed) + " are changed all the time");
 }
 
 Result<ManyLookups::CloudPoses> ManyLookups::poses_of(std::string_view a, std::string_view b,

@@ -56,6 +56,10 @@ class ManyLookups {
   [[nodiscard]] Result<CloudPoses> over_fixed(std::string_view a, std::string_view b,
                                               const CloudQuery& query,
                                               const std::vector<Time>& instants);
+  /// @return also kChangedMeanwhile
+  [[nodiscard]] Result<CloudPoses> poses_over_fixed(std::string_view a, std::string_view b,
+                                                    const CloudQuery& query, const Query& at_a,
+                                                    const std::vector<Time>& instants);
   [[nodiscard]] Result<Trajectory> trajectory_once(std::string_view a, std::string_view b,
                                                    const std::vector<Time>& instants,
                                                    const Query& query);

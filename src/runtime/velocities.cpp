@@ -6,17 +6,22 @@
 
 #include "base/saturating.hpp"
 #include "base/stamp.hpp"
-#include "calls/two_reads_task.hpp"
+#include "calls/one_state_task.hpp"
 #include "math/mean_velocity.hpp"
 
 namespace tfdude {
 namespace {
 
-std::vector<EdgeAtEnds> edges_of(const TwoReadsTask& task) {
+// The reads of a velocity.
+constexpr std::size_t kBegin = 0;
+constexpr std::size_t kEnd = 1;
+constexpr std::size_t kMiddle = 2;
+
+std::vector<EdgeAtEnds> edges_of(const OneStateTask& task) {
   std::vector<EdgeAtEnds> edges;
-  const ObservedPath& before = task.path(0);
-  const ObservedPath& after = task.path(1);
-  const auto& planned = task.planned(0).edges;
+  const ObservedPath& before = task.path(kBegin);
+  const ObservedPath& after = task.path(kEnd);
+  const auto& planned = task.planned(kBegin).edges;
   for (std::size_t k = 0; k < planned.size(); ++k) {
     const std::string& id = planned[k].info.id;
     const bool moves =
@@ -28,18 +33,12 @@ std::vector<EdgeAtEnds> edges_of(const TwoReadsTask& task) {
   return edges;
 }
 
-// Whether B turns by more than half a turn from the first instant over another one to the last:
-// then the shorter way between the first and the last pose is not the way that it took.
-bool turns_too_far(const std::vector<EdgeAtEnds>& edges, const Pose& between) {
-  Pose first;
-  Pose last;
-  for (const EdgeAtEnds& edge : edges) {
-    const bool up = edge.way == ObservedEdge::Way::kUp;
-    first = first * (up ? edge.before.pose.inverse() : edge.before.pose);
-    last = last * (up ? edge.after.pose.inverse() : edge.after.pose);
-  }
-  const Eigen::Quaterniond& middle = between.rotation();
-  return first.rotation().angularDistance(middle) + middle.angularDistance(last.rotation()) >
+// Whether B turns by more than half a turn from the first instant over the middle to the last: then
+// the shorter way between the first and the last pose is not the way that it took.
+bool turns_too_far(const OneStateTask& task) {
+  const Eigen::Quaterniond middle = task.pose(kMiddle).rotation();
+  return task.pose(kBegin).rotation().angularDistance(middle) +
+             middle.angularDistance(task.pose(kEnd).rotation()) >
          EIGEN_PI;
 }
 
@@ -93,13 +92,13 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   const auto interval = this->interval(a, b, query, *newest->stamp, deadline);
   if (!interval) return tl::unexpected(interval.error());
   const Interval& ends = *interval;
-  const auto read_at = [&](Time at) { return TwoReadsTask::Read{a, b, {at, {}, {}}}; };
-  TwoReadsTask task(structure_.forest, read_at(ends.begin), read_at(ends.end), true);
+  const auto read_at = [&](Time at) { return OneStateTask::Read{a, b, {at, {}, {}}}; };
+  const Time middle = ends.begin + (ends.end - ends.begin) / 2;
+  OneStateTask task(structure_.forest, {read_at(ends.begin), read_at(ends.end), read_at(middle)},
+                    true);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
   const std::vector<EdgeAtEnds> edges = edges_of(task);
-  const auto between = lookup(a, b, ends.begin + (ends.end - ends.begin) / 2, deadline);
-  if (!between) return tl::unexpected(between.error());
-  if (turns_too_far(edges, between->pose)) {
+  if (turns_too_far(task)) {
     return fail_about_frame(Errc::kInvalidInput,
                             "frame " + quote(b) + " turns by more than half a turn in " + quote(a) +
                                 " within " + readable(ends.end - ends.begin) +
@@ -113,7 +112,7 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   velocity.basis.sources = std::move(mean.sources);
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!edges[k].before.unspecified && !edges[k].after.unspecified) continue;
-    velocity.basis.unspecified.push_back(task.planned(0).edges[k].info.id);
+    velocity.basis.unspecified.push_back(task.planned(kBegin).edges[k].info.id);
   }
   velocity.covariance.set_complete(velocity.basis.unspecified.empty());
   return velocity;

@@ -287,6 +287,14 @@ void add_once(const std::vector<std::string>& more, std::vector<std::string>& na
   }
 }
 
+std::vector<std::string> unspecified_of(const std::vector<EdgeFromFixed>& way) {
+  std::vector<std::string> ids;
+  for (const EdgeFromFixed& edge : way) {
+    if (edge.X_PC.unspecified) ids.push_back(edge.id);
+  }
+  return ids;
+}
+
 }  // namespace
 
 Result<std::vector<EdgeFromFixed>> edges_from_fixed(const Forest& forest, std::string_view fixed,
@@ -317,11 +325,9 @@ StampedTransform over_fixed(const StampedTransform& X_FA, const StampedTransform
   StampedTransform X_AB{between(X_FA, X_FB), X_FB.stamp};
   Basis& basis = X_AB.basis;
   basis.order = order;
-  std::vector<std::string> unspecified(X_FA.basis.unspecified.rbegin(),
-                                       X_FA.basis.unspecified.rend());
-  add_once(X_FB.basis.unspecified, unspecified);
   if (to_a.empty() || to_b.empty()) {
-    basis.unspecified = std::move(unspecified);
+    basis.unspecified.assign(X_FA.basis.unspecified.rbegin(), X_FA.basis.unspecified.rend());
+    add_once(X_FB.basis.unspecified, basis.unspecified);
     basis.sources = X_FA.basis.sources;
     add_once(X_FB.basis.sources, basis.sources);
     basis.bound = X_FA.basis.bound || X_FB.basis.bound;
@@ -334,6 +340,9 @@ StampedTransform over_fixed(const StampedTransform& X_FA, const StampedTransform
     }
     return X_AB;
   }
+  std::vector<std::string> unspecified = unspecified_of(to_a);
+  std::reverse(unspecified.begin(), unspecified.end());
+  add_once(unspecified_of(to_b), unspecified);
   const bool same_instant = X_FA.stamp && X_FA.stamp == X_FB.stamp;
   const bool a_is_later = X_FA.stamp && X_FB.stamp && *X_FA.stamp > *X_FB.stamp;
   TwoWays ways(std::move(to_a), std::move(to_b), same_instant, a_is_later);
@@ -342,7 +351,7 @@ StampedTransform over_fixed(const StampedTransform& X_FA, const StampedTransform
   }
   basis.sources = ways.sources();
   ways.relate();
-  X_AB.covariance = ways.X_AB(order).covariance;
+  static_cast<Transform&>(X_AB) = ways.X_AB(order);
   if (!basis.unspecified.empty()) X_AB.covariance.set_complete(false);
   basis.bound = ways.is_bound();
   return X_AB;

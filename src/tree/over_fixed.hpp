@@ -34,7 +34,8 @@ struct EdgeFromFixed {
 /// dynamic edge at two instants may be correlated in any way, and so may those of a source that it
 /// names: the covariance is an upper bound. Its share is bound() of its own two, as different edges
 /// err independently, unless an observation has tied it to others.
-/// @param to_a, to_b  may be empty if no edge is on both paths
+/// @param X_FA, X_FB  of which only the stamps count if there are edges
+/// @param to_a, to_b  of one state; may be empty if no edge is on both paths
 [[nodiscard]] StampedTransform over_fixed(const StampedTransform& X_FA,
                                           const StampedTransform& X_FB,
                                           std::vector<EdgeFromFixed> to_a,

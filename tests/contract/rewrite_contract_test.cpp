@@ -187,12 +187,15 @@ TEST_CASE("rewrite: who looks up or watches has one history or the other") {
   CHECK(seen > 20);
 }
 
-TEST_CASE("rewrite: a velocity and a motion between two instants are of one history") {
+TEST_CASE("rewrite: velocities, motions and clouds between two instants are of one history") {
   Slam slam(joined_by(GENERATE(from_range(testing::networks()))));
   const TimeInterval interval{ms(1000), ms(4000)};
   REQUIRE(slam.node->rewrite("odom", interval, saying(0, 1000, 4000)));
   REQUIRE(slam.node->update("fixed", along_x(1)));
   std::atomic<bool> stop{false};
+  CloudQuery cloud;
+  cloud.stamps = {ms(1500), ms(3500)};
+  cloud.fixed = "map";
   // The robot rests, each time elsewhere.
   std::thread rewrites([&] {
     for (int i = 1; !stop; ++i) {
@@ -211,7 +214,11 @@ TEST_CASE("rewrite: a velocity and a motion between two instants are of one hist
       if (velocity && velocity->linear.x() != 0) ++moved;
       const auto X = client->lookup("odom", query(1500), "odom", query(3500), "map");
       if (X && X->pose.translation().x() != 0) ++moved;
-      seen += velocity && X ? 1 : 0;
+      const auto points =
+          client->transform_cloud("odom", "odom", Eigen::Matrix3Xd::Zero(3, 2), cloud);
+      if (points && !points->points.isZero()) ++moved;
+      if (!points) errors.insert(outcome(points));
+      seen += velocity && X && points ? 1 : 0;
       if (!velocity) errors.insert(outcome(velocity));
       if (!X) errors.insert(outcome(X));
     }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -11,10 +10,10 @@
 
 namespace tfdude {
 
-/// Asks for the edges of two paths, each at an instant of its own, or of one path at two instants.
-/// What one owner says is of one state: no value is from before a change and another one from after
-/// it. The answers tell which edges are dynamic.
-class TwoReadsTask final : public Task {
+/// Asks for the edges of several paths, each at an instant of its own, or of one path at several
+/// instants. What one owner says is of one state: no value is from before a change and another one
+/// from after it. The answers tell which edges are dynamic.
+class OneStateTask final : public Task {
  public:
   struct Read {
     std::string a;
@@ -22,14 +21,20 @@ class TwoReadsTask final : public Task {
     Query query;  ///< of an instant, or of edges that are static
   };
 
-  /// How often owners are asked anew that commit something between the two reads, before the values
-  /// are compared; and after that.
+  /// How often owners are asked anew that commit something between the reads, before the values are
+  /// compared; and after that.
   static constexpr int kTriesForOneCommit = 5;
   static constexpr int kMostTries = 15;
 
+  /// @param reads  at least one
   /// @param timed  stamps that an owner has made up do not count, as LookupRequest::timed
-  TwoReadsTask(const Forest& forest, Read first, Read second, bool timed)
-      : forest_(forest), reads_{std::move(first), std::move(second)}, timed_(timed) {}
+  OneStateTask(const Forest& forest, std::vector<Read> reads, bool timed)
+      : forest_(forest),
+        reads_(std::move(reads)),
+        timed_(timed),
+        plans_(reads_.size()),
+        answers_(reads_.size()),
+        paths_(reads_.size()) {}
 
   [[nodiscard]] std::vector<std::string> frames() const override;
   [[nodiscard]] Result<void> plan(const Directory& directory, Clock::time_point now) override;
@@ -37,26 +42,30 @@ class TwoReadsTask final : public Task {
   /// @return also kChangedMeanwhile
   [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point now) override;
 
-  /// Once it is done: of the first read, 0, or the second one, 1.
+  // Once it is done, of the read with this number:
   [[nodiscard]] const ObservePlan& planned(std::size_t read) const { return plans_[read]; }
   [[nodiscard]] const ObservedPath& path(std::size_t read) const { return paths_[read]; }
+  /// X_AB.
+  [[nodiscard]] Pose pose(std::size_t read) const;
 
  private:
   using Answers = std::vector<SegmentValues>;
 
-  void ask_both();
+  void ask_all();
+  void ask_again_but_the_last();
   [[nodiscard]] bool are_of_one_state() const;
-  [[nodiscard]] bool is_first_unchanged(const Answers& again) const;
+  /// @param again  of all reads but the last, after that
+  [[nodiscard]] bool are_unchanged(const std::vector<Answers>& again) const;
   [[nodiscard]] Result<Next> conclude();
 
   const Forest& forest_;
-  const std::array<Read, 2> reads_;
+  const std::vector<Read> reads_;
   const bool timed_;
-  std::array<ObservePlan, 2> plans_;
-  std::array<Answers, 2> answers_;
-  std::array<ObservedPath, 2> paths_;
+  std::vector<ObservePlan> plans_;
+  std::vector<Answers> answers_;
+  std::vector<ObservedPath> paths_;
   std::vector<Part> parts_;
-  bool asks_first_again_ = false;
+  bool compares_ = false;  // all reads but the last are asked again
   int tries_ = 0;
 };
 
