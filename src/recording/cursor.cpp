@@ -150,7 +150,10 @@ std::size_t Cursor::load(std::size_t number) {
     bytes += message.data.size();
     return true;
   });
-  if (!read) note(read.error().message);
+  if (!read) {
+    note(read.error().message);
+    forget_covariances();
+  }
   if (!foreign_) return bytes;
   std::stable_sort(
       loaded_.begin(), loaded_.end(),
@@ -240,8 +243,17 @@ Result<void> Cursor::decode_values(const Message& message) {
   recorded.log = log_of(message);
   recorded.foreign = false;
   auto ok = decoder_.decode(message.data, *values);
-  if (!ok) loaded_.drop_last();
+  if (!ok) {
+    loaded_.drop_last();
+    forget_covariances();
+  }
   return ok;
+}
+
+// The next value "with the covariance as before" may mean one that could not be read.
+void Cursor::forget_covariances() {
+  decoder_ = ValuesDecoder(*edges_);
+  note("values with a covariance as before are left out from there on, until all is told again");
 }
 
 Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {

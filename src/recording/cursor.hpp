@@ -101,6 +101,7 @@ class Cursor {
   void add(const Message& message, bool statics_only);
   [[nodiscard]] Result<void> decode(Topic topic, const Message& message);
   [[nodiscard]] Result<void> decode_values(const Message& message);
+  void forget_covariances();
   [[nodiscard]] Result<void> decode_transforms(bool is_static, const Message& message);
   void date_transforms();
   void note(std::string problem);

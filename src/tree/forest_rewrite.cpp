@@ -132,6 +132,7 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
   const EdgeTiming& timing = timing_of(edge);
   const std::int64_t newest = nanoseconds(*values.back()->stamp);
   const std::int64_t oldest = saturating_subtract(newest, timing.span.count());
+  const std::int64_t from = std::max<std::int64_t>(nanoseconds(*values.front()->kept_before), 0);
   const std::size_t skipped = values.size() - std::min(values.size(), timing.count);
   std::deque<SampleRevision> revisions;  // which the samples refer to
   std::vector<TimedValue> samples;
@@ -140,8 +141,8 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
   for (std::size_t i = skipped; i < values.size(); ++i) {
     const PushedValue& told = *values[i];
     const std::int64_t stamp = nanoseconds(*told.stamp);
-    const bool follows = samples.empty() || stamp > samples.back().stamp;
-    if (stamp < oldest || stamp < 0 || !follows || !is_finite(told.X)) continue;
+    const bool follows = samples.empty() ? stamp >= from : stamp > samples.back().stamp;
+    if (stamp < oldest || !follows || !is_finite(told.X)) continue;
     samples.push_back({stamp, &told.X, nullptr});
     if (told.made_up) made_up = samples.size();
     if (is_of_sample(told)) {
@@ -149,7 +150,7 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
     }
   }
   if (samples.empty()) return;
-  replace_samples(edge, nanoseconds(*values.front()->kept_before), kEnd, samples);
+  replace_samples(edge, from, kEnd, samples);
   const HeldVersion& fresh = frames_.newest_value(slot);
   if (made_up > 0) fresh.samples->set_made_up(fresh.number - (samples.size() - made_up));
   if (samples.back().revision != nullptr) show_revision(slot);

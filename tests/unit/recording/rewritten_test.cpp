@@ -1,8 +1,11 @@
 // A recording in which the past was rewritten.
 
 #include <filesystem>
+#include <fstream>
+#include <optional>
 #include <string>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include "tfdude/recording/recording.hpp"
@@ -98,6 +101,126 @@ TEST_CASE("a recording answers as it was believed before a rewrite, and after it
     CHECK(x_at(*recording, 4.875, 22) == Approx((4.75 + 100) / 2));
     CHECK(x_at(*recording, 21, 22) == Approx(21));
   }
+}
+
+TEST_CASE("a recording leaves a sample out that is from before the past which was rewritten") {
+  const File file;
+  {
+    auto writer = RecordingWriter::create(file.path(), at(0));
+    REQUIRE(writer);
+    record(*writer);
+    ValuesNews rewritten{102, {{1, at(3), along_x(100)}, {1, at(5), along_x(5)}}};
+    rewritten.values[0].begins = Covariance();
+    rewritten.values[0].kept_before = at(5);
+    REQUIRE(writer->add({"slam", rewritten}, at(22.5)));
+    REQUIRE(writer->finish(at(23)));
+  }
+  auto recording = Recording::open(file.path());
+  REQUIRE(recording);
+  for (const double t : {2.75, 3.0, 4.25, 4.875, 5.0}) CHECK(x_at(*recording, t, 23) == Approx(t));
+}
+
+// The robot drives 1 m/s in odom, which the map has corrected by 3 m in between.
+TEST_CASE("a transform between two instants of a recording is of one state") {
+  const File file;
+  {
+    auto writer = RecordingWriter::create(file.path(), at(0));
+    REQUIRE(writer);
+    REQUIRE(writer->add({"slam", ReachNews{true, ""}}, at(0)));
+    REQUIRE(writer->add(
+        {"slam", FramesNews{{{"map", ""}, {"odom", "map"}, {"robot", "odom"}, {"eye", "map"}}, 7}},
+        at(0)));
+    const auto still = [](std::uint32_t frame, double x, double deviation) {
+      WatchedValue value{frame, {}, along_x(x)};
+      value.X_PC.covariance =
+          Covariance::from_stddev({deviation, deviation, deviation, 0, 0, 0}).value();
+      value.begins = Covariance();
+      return value;
+    };
+    REQUIRE(writer->add({"slam", ValuesNews{1, {still(1, 0, 0.1), still(3, 2, 0)}}}, at(0)));
+    for (int i = 0; i <= 80; ++i) {
+      const double t = 0.25 * i;
+      WatchedValue value{2, at(t), along_x(t)};
+      if (i == 0) value.begins = Covariance();
+      REQUIRE(writer->add({"slam", ValuesNews{static_cast<std::uint64_t>(i + 2), {value}}}, at(t)));
+      if (i == 40) REQUIRE(writer->add({"slam", ValuesNews{50, {still(1, 3, 0.2)}}}, at(t)));
+      if (i != 60) continue;
+      REQUIRE(writer->add(
+          {"slam",
+           FramesNews{{{"map", ""}, {"odom", "map"}, {"robot", "odom"}, {"eye", "robot"}}, 7}},
+          at(t)));
+      REQUIRE(writer->add({"slam", ValuesNews{70, {still(3, 0.5, 0)}}}, at(t)));
+    }
+    REQUIRE(writer->finish(at(23)));
+  }
+  auto recording = Recording::open(file.path());
+  REQUIRE(recording);
+  const auto between = [&](const std::string& a, double t_a, const std::string& b, double t_b) {
+    return recording->lookup_at(a, at(t_a), b, at(t_b), "map", {});
+  };
+  for (const auto& [from, to] : {std::pair(8.0, 12.0), std::pair(12.0, 8.0)}) {
+    const auto X = between("robot", from, "robot", to);
+    REQUIRE(X);
+    CHECK(X->pose.translation().x() == Approx(to - from));
+    CHECK(X->covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-15);
+    CHECK(X->stamp == at(to));
+  }
+  const auto seen = between("eye", 12, "robot", 8);
+  REQUIRE(seen);
+  CHECK(seen->pose.translation().x() == Approx(3 + 8 - 2));
+  CHECK(seen->covariance.of_specified().matrix()(0, 0) == Approx(0.04));
+  // In between it is taken from the map to the robot.
+  const auto carried = between("eye", 12, "robot", 18);
+  REQUIRE(carried);
+  CHECK(carried->pose.translation().x() == Approx(3 + 18 - 2));
+  // Before the correction nobody knew of it.
+  const auto before = between("eye", 7, "robot", 8);
+  REQUIRE(before);
+  CHECK(before->pose.translation().x() == Approx(8 - 2));
+}
+
+// Chunks: a covariance, another one, and a value with the covariance as before.
+TEST_CASE("after a damaged part of a recording no covariance from before it is taken") {
+  const File file;
+  std::uintmax_t begin = 0;
+  std::uintmax_t end = 0;
+  {
+    auto writer = RecordingWriter::create(file.path(), at(0));
+    REQUIRE(writer);
+    REQUIRE(writer->add({"slam", ReachNews{true, ""}}, at(0)));
+    REQUIRE(writer->add({"slam", FramesNews{{{"map", ""}, {"robot", "map"}}, 7}}, at(0)));
+    const auto add = [&](int i, double deviation) {
+      WatchedValue value{1, at(i), along_x(i)};
+      value.X_PC.covariance =
+          Covariance::from_stddev({deviation, deviation, deviation, 0, 0, 0}).value();
+      if (i == 1) value.begins = Covariance();
+      REQUIRE(writer->add({"slam", ValuesNews{static_cast<std::uint64_t>(i), {value}}}, at(i)));
+      REQUIRE(writer->flush(at(i)));
+    };
+    add(1, 0.01);
+    begin = std::filesystem::file_size(file.path());
+    add(2, 1);
+    end = std::filesystem::file_size(file.path());
+    add(3, 1);
+    REQUIRE(writer->finish(at(4)));
+  }
+  const auto variance_at = [&](int t) -> std::optional<double> {
+    auto recording = Recording::open(file.path());
+    REQUIRE(recording);
+    const auto X = recording->lookup_at("map", "robot", at(t), {});
+    if (!X) return std::nullopt;
+    return X->covariance.of_specified().matrix()(0, 0);
+  };
+  CHECK(variance_at(3) == 1.0);
+  {
+    std::fstream bytes(file.path(), std::ios::in | std::ios::out | std::ios::binary);
+    bytes.seekg(static_cast<std::streamoff>(begin + end) / 2);
+    const int byte = bytes.peek();
+    bytes.seekp(static_cast<std::streamoff>(begin + end) / 2);
+    bytes.put(static_cast<char>(byte ^ 1));
+  }
+  CHECK(variance_at(1) == Approx(1e-4));
+  CHECK_FALSE(variance_at(3));
 }
 
 TEST_CASE("ten minutes at 100 Hz are one message of a recording") {
