@@ -82,6 +82,8 @@ void Call::note_changes(const std::vector<Reply>& replies) {
     const Reply& reply = replies[i];
     if (std::holds_alternative<Error>(reply.body)) continue;
     if (parts[i].owner != kHeldHere) {
+      // What changes no structure is not waited for here.
+      if (std::holds_alternative<ReviseRequest>(parts[i].request.body)) continue;
       changes_.push_back({parts[i].owner, parts[i].partition, reply.epoch, reply.lamport_time});
     } else if (is_stored_first(parts[i].request)) {
       own_ = true;

@@ -39,6 +39,7 @@ class ObserveTask final : public Task {
   [[nodiscard]] std::vector<Part>& parts() override {
     return stage_ < Stage::kFirst ? plan_.parts : shares_;
   }
+  [[nodiscard]] bool changes() const override { return stage_ >= Stage::kFirst; }
   [[nodiscard]] Result<Next> take(std::vector<Reply> replies, Clock::time_point now) override;
   [[nodiscard]] bool may_plan_again() const override { return stage_ < Stage::kFirst; }
   [[nodiscard]] Milliseconds pause() const override { return pause_; }

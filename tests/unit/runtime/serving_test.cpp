@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <vector>
 
+#include "runtime/observations.hpp"
 #include "runtime/yielding.hpp"
 #include "support/captured_log.hpp"
 #include "support/catch.hpp"
@@ -219,20 +220,19 @@ TEST_CASE("member runner: an owner's own observation and correlation return once
   owner.member.with_rules([](Member& member) { member.claim("here", 1, Time(1s), 1); });
   owner.member.open(std::make_unique<SlowStore>(disk), 1h);
   const StoredState nothing;
-  REQUIRE(owner.member.serve(&nothing, kArm));
+  Transform X = along_x(4);
+  X.covariance = Covariance::from_stddev({1, 1, 1, 1, 1, 1}).value();
+  REQUIRE(owner.member.serve(&nothing, {{"arm", "", {}}, {"hand", "arm", X}}));
   REQUIRE(owner.member.publish_all());
+  Observations observations(owner.context);
   disk.let_it_stand_still(true);
-  Request request{1, "hand", CorrelateRequest{{true, {}, {}}}};
-  if (observes) {
-    const Revision revision{"hand", along_x(5), {}};
-    request.body = ReviseRequest{{{"hand", {1, 1, 1}, false, revision}},
-                                 {},
-                                 owner.structure.forest.newest_commit(),
-                                 owner.member.incarnation()};
-  }
-  auto change = std::async(std::launch::async, [&] {
+  auto change = std::async(std::launch::async, [&]() -> Result<void> {
+    if (observes) {
+      auto seen = observations.observe({"arm", "hand", X, {}, {}}, Deadline(20s));
+      return seen ? Result<void>() : tl::unexpected(seen.error());
+    }
     return owner.requests.change(Deadline(20s), {}, [&](const Directory&) -> Result<Part> {
-      return Part{kHeldHere, "arm", request};
+      return Part{kHeldHere, "arm", {1, "hand", CorrelateRequest{{true, {}, {}}}}};
     });
   });
   const bool waited = eventually([&] { return disk.is_waited_for(); });
