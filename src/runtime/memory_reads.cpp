@@ -41,8 +41,9 @@ MemoryReads::MemoryReads(const Context& context, ProcessMemory& memory, Watchers
       member_(context.member),
       requests_(context.requests),
       memory_(memory),
+      is_off_(memory.port == nullptr),
       // A client that follows only some frames has no structure to walk.
-      reads_(memory.port != nullptr && !context.options.follow),
+      reads_(!is_off_ && !context.options.follow),
       timeout_(context.options.timeout),
       watchers_(std::move(watchers)),
       job_(context.threads.asking, [this] { return run(); }),
@@ -60,6 +61,7 @@ void MemoryReads::stop() {
   job_.stop();
   std::unique_ptr<SharedMemory> port;
   {
+    const Lock attaching(attaching_);  // a callback may attach
     const Lock lock(offer_mutex_);
     offer_.emplace();
     port = std::move(memory_.port);
@@ -107,6 +109,7 @@ Loop::Clock::time_point MemoryReads::run() {
 
 void MemoryReads::attach_wanted() {
   const Lock attaching(attaching_);
+  if (memory_.port == nullptr) return;  // stopped
   std::vector<Owner> wanted;
   {
     const Lock lock(mutex_);
@@ -358,8 +361,8 @@ void MemoryReads::tell(std::vector<PartitionInfo>& partitions) const {
     if (!owner || *owner == kHeldHere) continue;
     const auto known = owners_.find(*owner);
     if (!reads_) {
-      one.why_not_in_memory = memory_.port == nullptr ? "it is switched off here"
-                                                      : "this client follows only some frames";
+      one.why_not_in_memory =
+          is_off_ ? "it is switched off here" : "this client follows only some frames";
     } else if (known == owners_.end() || known->second.state == Known::State::kWanted) {
       one.why_not_in_memory = "none of its frames was looked up yet";
     } else if (known->second.state == Known::State::kAttached) {

@@ -178,6 +178,7 @@ class MemoryReads {
   MemberRunner& member_;
   Requests& requests_;
   ProcessMemory& memory_;
+  const bool is_off_;
   const bool reads_;
   const Milliseconds timeout_;
   RemoteEdges edges_;  // of owners that are there
