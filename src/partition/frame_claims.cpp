@@ -164,6 +164,7 @@ bool FrameClaims::take(const std::string& id, std::optional<std::uint64_t> lampo
   forest_.drop_remote(id, theirs.owner);
   cut_.erase(id);
   shadow(id, std::move(theirs));
+  note_passed_on(id, lamport_time);
   return true;
 }
 

@@ -218,7 +218,8 @@ class FrameClaims {
   [[nodiscard]] FrameClaim in_force(const FrameInfo& there) const;
   [[nodiscard]] std::uint32_t page_of(std::string_view id) const;
   void shadow(const std::string& id, FrameClaim claim);
-  void note_passed_on(const std::string& id);
+  /// @param held  the time of the claim of this process, if it is about to hold the frame
+  void note_passed_on(const std::string& id, std::optional<std::uint64_t> held = {});
   void promote(const std::string& id);
   void reconsider();
   void reconsider(const std::string& id);

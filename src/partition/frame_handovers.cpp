@@ -66,13 +66,14 @@ bool FrameClaims::goes_on(std::uint64_t own, Owner owner, std::uint64_t theirs) 
 
 // Participants that have heard of the new owner do not need the former one's claim, and must not
 // fall back to it if the new owner removes the frame.
-void FrameClaims::note_passed_on(const std::string& id) {
+void FrameClaims::note_passed_on(const std::string& id, std::optional<std::uint64_t> held) {
   const auto known = shadowed_.find(id);
   if (known == shadowed_.end()) return;
   const auto there = forest_.info(id);
+  if (there && there->owner == kHeldHere) held = there->lamport_time;
   for (FrameClaim& one : known->second) {
     const auto is_next = [&](std::uint64_t other) { return is_passed_on(other, one.lamport_time); };
-    const bool by_held = there && there->owner == kHeldHere && is_next(there->lamport_time);
+    const bool by_held = held && is_next(*held);
     one.passed_on =
         one.passed_on || by_held ||
         std::any_of(known->second.begin(), known->second.end(),

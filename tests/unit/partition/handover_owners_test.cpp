@@ -29,10 +29,12 @@ constexpr std::chrono::seconds kLong{10};
 
 // An owner whose disk and messages wait until they are told.
 struct Arm : Replica {
+  /// @param before  heard before it serves; null: nobody
   Arm(const std::string& name, MemoryStore& store, std::int64_t start,
-      const std::vector<FrameSpec>& frames)
+      const std::vector<FrameSpec>& frames, const Arm* before = nullptr)
       : Replica(name), member(forest, directory, name), store_(store), now_(start) {
     member.claim("here", 42, now(), 5);
+    if (before != nullptr) hear(*before);
     (void)member.introduce();
     const StoredState left = store.load().value_or(StoredState());
     REQUIRE(member.serve(&left, frames, now()));
@@ -113,8 +115,7 @@ struct Arm : Replica {
 struct Arms {
   Arms() {
     restart_first();
-    arm2 =
-        std::make_unique<Arm>("arm2", store2, 2'000'000, std::vector<FrameSpec>{{"other", "", {}}});
+    restart_second(nullptr);
     meet();
   }
   void restart_first() {
@@ -122,6 +123,10 @@ struct Arms {
         "arm1", store1, starts_ += 1'000'000,
         std::vector<FrameSpec>{
             {"base", "", {}}, {"flange", "base", along_x(1)}, {"gripper", "base", along_x(1)}});
+  }
+  void restart_second(const Arm* before) {
+    arm2 = std::make_unique<Arm>("arm2", store2, 1'000'000 + (starts_ += 1'000'000),
+                                 std::vector<FrameSpec>{{"other", "", {}}}, before);
   }
   void meet() {
     for (int i = 0; i < 3; ++i) {
@@ -301,6 +306,27 @@ TEST_CASE("handover: an owner that was missed is not taken over from before both
   arms.arm1->save();
   arms.agree();
   check_only(arms, "arm2", 1);
+}
+
+// The former owner dies, and has told the next process of the new one only that it lets go.
+TEST_CASE("handover: a new owner that was away before keeps the frame through its restart") {
+  Arms arms;
+  arms.arm1->lose(*arms.arm2);
+  arms.arm1->save();
+  arms.restart_second(nullptr);
+  arms.agree();
+  arms.adopt();
+  arms.arm1->hear(*arms.arm2);
+  REQUIRE(arms.arm1->ask(HandOverRequest{Step::kEnd, "arm2"}) == "ok");
+  arms.arm1->save();
+  arms.meet();
+  REQUIRE(arms.arm2->ask(MoveRequest{"other", along_x(2)}) == "ok");
+  arms.arm2->save();
+  arms.restart_second(&*arms.arm1);
+  arms.arm2->yield();
+  CHECK(arms.arm2->owner() == "arm2");
+  CHECK(x_of(arms.arm2->forest.value("gripper")) == 2);
+  CHECK(arms.arm2->update(3) == "ok");
 }
 
 TEST_CASE("handover: only the partition to which a frame is offered can adopt it") {
