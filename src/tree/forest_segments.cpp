@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <limits>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/interpolate.hpp"
@@ -40,6 +42,20 @@ Result<void> check_edges(const std::vector<Ends>& segments) {
   return fail(Errc::kTooMuch, "the " + std::to_string(segments.size()) +
                                   " segments have more than " + std::to_string(kMostEdges) +
                                   " edges");
+}
+
+// What is told of the rows of an edge that drifts may take a walk over its samples.
+Result<void> check_once(std::vector<PathEnds> segments) {
+  const auto by_names = [](const PathEnds& a, const PathEnds& b) {
+    return std::tie(a.from, a.to) < std::tie(b.from, b.to);
+  };
+  std::sort(segments.begin(), segments.end(), by_names);
+  const auto twice = std::adjacent_find(
+      segments.begin(), segments.end(),
+      [&](const PathEnds& a, const PathEnds& b) { return !by_names(a, b); });
+  if (twice == segments.end()) return {};
+  return fail(Errc::kInvalidInput, "the segment from " + quote(twice->from) + " to " +
+                                       quote(twice->to) + " is asked for twice");
 }
 
 Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathEnds>& segments) {
@@ -316,6 +332,9 @@ bool all_finite(const ValuesAtInstant& found) {
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
                                               bool edges, Rows rows) const {
+  if (rows == Rows::kOfPath) {
+    if (auto ok = check_once(segments); !ok) return tl::unexpected(std::move(ok.error()));
+  }
   const epoch::Guard guard;
   const auto find = [&] { return all_ends(impl_->frames_, segments); };
   const auto answer = [&](const std::vector<Ends>& ends) {
