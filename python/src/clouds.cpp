@@ -112,8 +112,7 @@ void by_transform(const Transform& X_AB, py::handle points, bool covariances, py
     throw py::value_error("out must have as many points, of the same type of numbers");
   }
   auto& cloud = *same;
-  {
-    const py::gil_scoped_release others;
+  without_gil([&] {
     cloud.points.resize(3, from.cols());
     if (covariances) {
       cloud.covariances.resize(6, from.cols());
@@ -121,7 +120,7 @@ void by_transform(const Transform& X_AB, py::handle points, bool covariances, py
     } else {
       tfdude::transform_cloud(X_AB.pose, from, cloud.points);
     }
-  }
+  });
   cloud.complete = X_AB.covariance.complete();
   cloud.basis = {};
   out.has_covariances = covariances;
@@ -223,6 +222,10 @@ void bind_clouds(py::module_& module, ClientClass& cls, py::handle transform) {
          bool covariance, py::handle own, py::handle timeout) {
         const CloudQuery query =
             to_cloud_query(at, stamps, group, fixed, covariance || !own.is_none(), own);
+        // To C++ no stamps are those that were not given.
+        if (!stamps.is_none() && query.stamps.empty() && py::len(points) > 0) {
+          throw py::value_error(std::to_string(py::len(points)) + " points, but 0 stamps");
+        }
         const Milliseconds wait = to_milliseconds(timeout, "timeout");
         return is_single(points) ? transform_cloud<float>(session, a, b, points, query, wait)
                                  : transform_cloud<double>(session, a, b, points, query, wait);

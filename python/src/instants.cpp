@@ -53,6 +53,7 @@ std::optional<std::vector<Time>> of_array(py::handle at, const char* what) {
     array = array.attr("astype")("datetime64[ns]").attr("view")("int64");
     kind = 'i';
   }
+  if (kind == 'b') throw py::type_error(std::string(what) + " must be instants, not bools");
   if (kind == 'u') check_unsigned(array);
   if (kind == 'i' || kind == 'u') {
     const auto ns = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(array);
@@ -61,6 +62,10 @@ std::optional<std::vector<Time>> of_array(py::handle at, const char* what) {
     return instants;
   }
   if (kind != 'f') return std::nullopt;
+  if (array.itemsize() < 8) {
+    throw py::type_error(std::string(what) + " must be float64: " +
+                         std::string(py::str(array.dtype())) + " is too coarse for an instant");
+  }
   const auto seconds = Doubles(array);
   for (std::size_t i = 0; i < count; ++i) {
     const double ns = std::round(seconds.data()[i] * 1e9);

@@ -276,19 +276,22 @@ Result<Trajectory> trajectory(const Session& session, const std::string& a, cons
 
 Batch at_one_instant(const Session& session, const std::vector<FramePair>& pairs,
                      const Query& query, Milliseconds wait) {
-  auto found = session.call([&](Client& c) { return c.lookup_many(pairs, query); });
-  const auto end = std::chrono::steady_clock::now() + std::min(wait, Milliseconds(1'000'000'000));
-  while (wait > Milliseconds(0)) {
-    const auto failed = std::find_if(found.begin(), found.end(), [](const auto& one) {
-      return !one && one.error().code != Errc::kTooOld && one.error().code != Errc::kInvalidInput;
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::min(wait, Milliseconds(1 << 30));
+  for (auto pause = Milliseconds(1);; pause = std::min(2 * pause, kLook)) {
+    auto found = session.call([&](Client& c) { return c.lookup_many(pairs, query); });
+    const auto failed = std::find_if(found.begin(), found.end(), [&](const auto& one) {
+      return !one && is_worth_waiting(one.error().code, query);
     });
-    const auto left = std::chrono::ceil<Milliseconds>(end - std::chrono::steady_clock::now());
-    if (failed == found.end() || left <= Milliseconds(0)) break;
+    const auto left = std::chrono::ceil<Milliseconds>(end - Clock::now());
+    if (failed == found.end() || left <= Milliseconds(0)) return {std::move(found)};
+    // Alone it may have an answer at once, but not at the instant of the others.
+    const auto next = Clock::now() + std::min(pause, left);
     const FramePair& pair = pairs[static_cast<std::size_t>(failed - found.begin())];
     wait_for(session, pair.a, pair.b, query, query.at, left);
-    found = session.call([&](Client& c) { return c.lookup_many(pairs, query); });
+    check_interrupted();
+    without_gil([&] { std::this_thread::sleep_until(next); });
   }
-  return {std::move(found)};
 }
 
 Batch of_trajectory(Trajectory&& trajectory, const std::vector<Time>& instants) {

@@ -3,6 +3,7 @@
 #include "arguments.hpp"
 #include "arrays.hpp"
 #include "bind.hpp"
+#include "session.hpp"
 
 namespace tfdude::python {
 namespace {
@@ -43,10 +44,7 @@ Eigen::Matrix3d matrix_at(const double* row_major) {
 TransformedArray transformed_array(py::object transform, Points points, Order order) {
   const auto& X_AB = transform.cast<const Transform&>();
   TransformedArray array{transform, std::move(points), {}, order};
-  {
-    const py::gil_scoped_release others;
-    array.points = tfdude::transform(X_AB, array.given.all, order);
-  }
+  array.points = without_gil([&] { return tfdude::transform(X_AB, array.given.all, order); });
   return array;
 }
 

@@ -45,8 +45,8 @@ bool is_forked_child() { return process().forked; }
 void finish() {
   if (is_forked_child()) return;
   process().exiting = true;
-  const std::set<Session*> sessions = process().sessions;
-  for (Session* session : sessions) session->close();
+  // Others may end while one is closed.
+  while (!process().sessions.empty()) (*process().sessions.begin())->close();
   const auto none = [] { return process().under_way == 0; };
   bool done = false;
   while (!done) {

@@ -15,6 +15,14 @@ bool may_return(Errc code) {
          code == Errc::kTimeout || code == Errc::kNotOwner || code == Errc::kNotYet;
 }
 
+bool is_worth_waiting(Errc code, const Query& query) {
+  // What was believed then stays as it is.
+  if (query.believed_at && (code == Errc::kTooOld || code == Errc::kNotYet)) return false;
+  // For the latest common time: one edge is ahead of the data of another.
+  if (code == Errc::kTooOld) return !query.at;
+  return may_return(code);
+}
+
 Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait) {
   const auto within = [](Milliseconds time) {
     return " within " + std::to_string(std::max(time, Milliseconds(0)).count()) + " ms";

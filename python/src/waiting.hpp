@@ -30,6 +30,8 @@ void check_interrupted();
 [[nodiscard]] Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait);
 /// Whether an owner, a frame or data that is missing may still come.
 [[nodiscard]] bool may_return(Errc code);
+/// The same of what a lookup lacks.
+[[nodiscard]] bool is_worth_waiting(Errc code, const Query& query);
 /// How often a wait looks.
 inline constexpr Milliseconds kLook{50};
 
@@ -73,8 +75,7 @@ auto call_when_ready(const Session& session, Milliseconds wait, Ready ready, Cal
     left = std::chrono::ceil<Milliseconds>(end - Clock::now());
     if (result || left <= Milliseconds(0) || !may_return(result.error().code)) return result;
     // What is waited for may be there all the time.
-    const py::gil_scoped_release released;
-    std::this_thread::sleep_for(std::min(pause, left));
+    without_gil([&] { std::this_thread::sleep_for(std::min(pause, left)); });
     pause = std::min(2 * pause, kLook);
   }
 }

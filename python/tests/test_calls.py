@@ -129,6 +129,12 @@ def test_cloud_with_stamps(network, car):
     assert np.allclose(still.points[:, 0], (stamps - stamps[-1]) / (10 * MS))
     grouped = car.transform_cloud("odom", "lidar", points, stamps=stamps, group=1.0)
     assert len(np.unique(grouped.points[:, 0].round(6))) <= 2
+    for none in ([], np.array([])):
+        with pytest.raises(ValueError, match="60 points, but 0 stamps"):
+            car.transform_cloud("odom", "lidar", points, stamps=none)
+    for wrong in ((stamps / 1e9).astype(np.float32), stamps > 0):
+        with pytest.raises(TypeError, match="stamps must be"):
+            car.transform_cloud("odom", "lidar", points, stamps=wrong)
     with pytest.raises(tfdude.ExtrapolationException):
         car.transform_cloud("odom", "lidar", points, stamps=stamps + 100 * MS)
     threading.Timer(0.02, lambda: car.update("base", Transform(), START + 300 * MS)).start()
