@@ -1,6 +1,7 @@
 #pragma once
 
 #include <charconv>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <string>
@@ -25,8 +26,13 @@ namespace tfdude::cli {
 
 [[nodiscard]] inline bool is_number(const std::string& text) { return to_number(text).has_value(); }
 
+[[nodiscard]] inline bool is_whole_number(const std::string& text) {
+  const auto number = to_number(text);
+  return number && std::floor(*number) == *number && std::isfinite(*number);
+}
+
 /// Makes all options that take numbers, of all commands, reject other text: CLI11 reads an empty
-/// text as 0. Call it after all options are added.
+/// text as 0, and 1.5 as 1 where it wants a whole number. Call it after all options are added.
 inline void require_numbers(CLI::App& app) {
   for (CLI::Option* option : app.get_options([](CLI::Option* one) {
          const std::string type = one->get_type_name();
@@ -34,10 +40,15 @@ inline void require_numbers(CLI::App& app) {
                                  type.rfind("NAME", 0) == 0;       // its numbers are checked later
          return one->get_items_expected_max() > 0 && !takes_text;  // a flag expects none
        })) {
+    const std::string type = option->get_type_name();
+    const bool positive = type.rfind("UINT", 0) == 0;
+    const bool whole = positive || type.rfind("INT", 0) == 0;
     // A transform runs before the other checks, such as that of the range.
     option->transform(CLI::Validator(
-        [](const std::string& text) {
-          return is_number(text) ? std::string() : "'" + text + "' is not a number";
+        [whole, positive](const std::string& text) -> std::string {
+          if (!is_number(text)) return "'" + text + "' is not a number";
+          if (positive && *to_number(text) < 0) return "'" + text + "' is negative";
+          return whole && !is_whole_number(text) ? "'" + text + "' is not a whole number" : "";
         },
         std::string()));
   }

@@ -5,9 +5,13 @@
 
 namespace tfdude::cli {
 
+std::string id_problem(const std::string& text) {
+  return text.empty() ? "an empty text is no id of a frame" : "";
+}
+
 void PathPrinting::add_ends(CLI::App& app) {
-  app.add_option("A", a, "the reference frame")->required();
-  app.add_option("B", b, "the frame seen from A")->required();
+  app.add_option("A", a, "the reference frame")->required()->check(id_problem);
+  app.add_option("B", b, "the frame seen from A")->required()->check(id_problem);
 }
 
 void add_covariance_flag(CLI::App& app, bool& covariance) {

@@ -22,6 +22,9 @@ struct PathFacts {
   std::string stamp{};                 ///< the line about the stamp
 };
 
+/// What is wrong with what was typed for the id of a frame; empty: nothing.
+[[nodiscard]] std::string id_problem(const std::string& text);
+
 /// The ends of a path, and how transforms along it are printed, whoever has found them.
 struct PathPrinting {
   /// Adds A and B.

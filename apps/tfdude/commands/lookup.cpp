@@ -19,16 +19,16 @@ struct Lookup final : Question {
     add_instant(app, at);
     auto* option = app.add_option(
         "--fixed", fixed, "frame that does not move between --at (for A) and --at-b (for B)");
-    option->check([](const std::string& text) {
-      return std::string(text.empty() ? "an empty text is no id of a frame" : "");
-    });
+    option->check(id_problem);
     add_stamp(app, "--at-b", at_b, "the instant for B; --at is for A")->needs(option);
     add_milliseconds(app, "--extrapolate", extrapolate_ms,
                      "how far to extrapolate beyond an edge's newest sample");
     app.add_flag("--age-noise", age_noise, "add the edges' process noise from --at until now");
     add_order(app, order);
     add_milliseconds(app, "--wait", wait_ms, "how long to wait for frames and data");
-    app.get_option("--wait")->excludes(option);
+    app.get_option("--wait")->excludes(option)->check([](const std::string& text) {
+      return is_whole_number(text) ? "" : "'" + text + "' is no whole number of milliseconds";
+    });
     add_recording(app);
     add_stamp(app, "--believed-at", believed_at,
               "what was known at this instant of that of --at, before later data corrected it; of "

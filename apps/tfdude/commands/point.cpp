@@ -29,6 +29,7 @@ struct PointCommand final : Question {
     app.add_option("--stddev", stddev, "standard deviations of each point [m]")
         ->type_name("3 NUMBERS")
         ->expected(3)
+        ->check(within(0, 1e9, "0 to 1e9"))
         ->excludes(option);
     app.add_flag("--direction", direction, "directions, which are only turned");
     app.add_flag("--joint", joint, "print the covariance of all points together");
