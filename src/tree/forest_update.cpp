@@ -51,21 +51,22 @@ Result<std::int64_t> Forest::Impl::stamp_for(const HeldVersion* const* edges, st
     }
     return stamp;
   }
-  bool moving = false;
+  const HeldVersion* moving = nullptr;
   std::int64_t newest = kAlways;
   for (std::size_t i = 0; i < count; ++i) {
     const HeldVersion& edge = *edges[i];
-    moving = moving || edge.moving() || timing_of(edge).moving;
+    if (!may_be_moving(edge)) continue;
+    if (moving == nullptr) moving = &edge;
     // A clock may have restarted with the process.
     if (!edge.left_behind()) newest = std::max(newest, edge.stamp);
   }
-  if (!moving) return kAlways;
+  if (moving == nullptr) return kAlways;
   if (!clock_.is_there()) {
     return fail(Errc::kInvalidInput,
-                "frame " + quote(edges[0]->name->text) + " is dynamic: its update needs a stamp");
+                "frame " + quote(moving->name->text) + " is dynamic: its update needs a stamp");
   }
   const auto now = clock_.now();
-  if (!now) return no_time(*edges[0]);
+  if (!now) return no_time(*moving);
   // If the clock stands still or was set back, the newest samples are replaced: stamps that are
   // made up must not tell a velocity.
   return newest <= *now ? *now : std::max(*now, newest_that_stays(edges, count, *now));
@@ -249,8 +250,10 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
   for (std::size_t i = 0; i < edges.size(); ++i) {
     reclaimer_.prefetch_held(kPrefetched);
     const std::uint32_t slot = to_update_[i]->slot;
-    push_value(slot, {edges[i].X_PC, state_of(edges[i])}, *at);
-    if (!stamp && *at != kAlways) mark_made_up(slot);
+    // Without a stamp, a static edge stays static beside others.
+    const bool timed = stamp || may_be_moving(*to_update_[i]);
+    push_value(slot, {edges[i].X_PC, state_of(edges[i])}, timed ? *at : kAlways);
+    if (!stamp && timed) mark_made_up(slot);
     if (const Correlation* said = correlation_of(edges[i])) say_correlation(slot, *said);
   }
   commit();

@@ -55,6 +55,30 @@ EdgeTiming kept_for(std::chrono::nanoseconds span, std::size_t restart_after = 5
 
 }  // namespace
 
+TEST_CASE("without a stamp a static edge stays static in an update of dynamic ones") {
+  Arm arm;
+  REQUIRE(arm.sample(1, kNow - 2s));
+  arm.clock = kNow - 1s;
+  const bool by_handle = GENERATE(false, true);
+  if (by_handle) {
+    const Handle moving = *arm.forest.find("arm");
+    const Handle fixed = *arm.forest.find("hand");
+    REQUIRE(arm.forest.update(std::vector<HandleUpdate>{{fixed, along_x(5)}, {moving, along_x(2)}},
+                              {}));
+  } else {
+    REQUIRE(
+        arm.forest.update(std::vector<EdgeUpdate>{{"hand", along_x(5)}, {"arm", along_x(2)}}, {}));
+  }
+  CHECK(arm.history().samples == 2);
+  CHECK_FALSE(arm.history("hand").dynamic());
+  arm.clock = kNow;
+  REQUIRE(arm.sample(3, kNow));
+  Query query;
+  CHECK(x_of(arm.forest.lookup("world", "hand", query)) == 8);
+  query.at = kNow - 2s;
+  CHECK(x_of(arm.forest.lookup("world", "hand", query)) == 6);
+}
+
 TEST_CASE("a stamp from the future is rejected and the error names both times") {
   Arm arm;
   // The edge is still static.
