@@ -15,8 +15,10 @@ std::vector<EdgeFromFixed> edges_of(const OneStateTask& task, std::size_t read) 
   const auto& planned = task.planned(read).edges;
   for (std::size_t i = 0; i < planned.size(); ++i) {
     const std::string& id = planned[i].info.id;
+    const PathCorrelation& correlation = path.correlations[i];
     edges.push_back({id, path.edges[i].X_PC, planned[i].way == ObservedEdge::Way::kUp,
-                     is_moving(id, path.correlations[i]), is_drifting(id, path.correlations[i])});
+                     is_moving(id, correlation), is_drifting(id, correlation),
+                     is_corrected(id, correlation)});
   }
   return edges;
 }

@@ -27,7 +27,8 @@ std::vector<EdgeAtEnds> edges_of(const OneStateTask& task) {
     const bool moves =
         is_moving(id, before.correlations[k]) || is_moving(id, after.correlations[k]);
     const bool drifts =
-        is_drifting(id, before.correlations[k]) && is_drifting(id, after.correlations[k]);
+        is_drifting(id, before.correlations[k]) && is_drifting(id, after.correlations[k]) &&
+        is_corrected(id, before.correlations[k]) == is_corrected(id, after.correlations[k]);
     edges.push_back({before.edges[k].X_PC, after.edges[k].X_PC, planned[k].way, !moves, drifts});
   }
   return edges;

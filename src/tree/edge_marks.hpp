@@ -11,7 +11,9 @@
 
 // What single edges are besides their values. A dynamic edge is listed in `observed_with` with
 // itself twice: what was observed is its sample, and a later one has another error. One that drifts
-// is listed three times: its later error follows from the earlier one.
+// is listed three times: its later error follows from the earlier one. If the instant is one that
+// observations have corrected, and no rows are asked for, it is listed four times: this error does
+// not follow from an earlier one that was not corrected.
 namespace tfdude {
 
 /// Adds the edges that each single edge was observed with, after its marks.

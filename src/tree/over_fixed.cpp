@@ -142,7 +142,8 @@ class TwoWays {
   [[nodiscard]] std::optional<Drift> drift_of(const EdgeFromFixed& earlier,
                                               const EdgeFromFixed& later) const {
     if (!is_free(earlier) && !is_free(later)) return Drift();
-    if (!earlier.drifts || !later.drifts) return std::nullopt;
+    const bool drifts = earlier.drifts && later.drifts && earlier.corrected == later.corrected;
+    if (!drifts) return std::nullopt;
     return drift_between(earlier.X_PC, later.X_PC);
   }
   // Whether its error at the other instant may be another one.
@@ -314,7 +315,8 @@ Result<std::vector<EdgeFromFixed>> edges_from_fixed(const Forest& forest, std::s
     here = up ? edge.parent : edge.id;
     const PathCorrelation& correlation = found->correlations[i];
     edges.push_back({edge.id, belief_of(found->values[i], correlation), up,
-                     is_moving(edge.id, correlation), is_drifting(edge.id, correlation)});
+                     is_moving(edge.id, correlation), is_drifting(edge.id, correlation),
+                     is_corrected(edge.id, correlation)});
   }
   return edges;
 }

@@ -16,7 +16,8 @@ struct EdgeFromFixed {
   Belief X_PC;
   bool up = false;  ///< the path goes from the child to the parent
   bool moving = false;
-  bool drifts = false;  ///< as EdgeTiming::drifts
+  bool drifts = false;     ///< as EdgeTiming::drifts
+  bool corrected = false;  ///< observations have corrected its value, if it drifts
 };
 
 /// Those of a path in one forest.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,7 +36,7 @@ struct PathCorrelation {
   std::optional<Covariance> unknown;
   std::vector<CommonError> common_errors;
   /// Of a single edge, as in Correlation; otherwise empty. For a lookup of edges, a dynamic edge is
-  /// listed with itself twice, before those, and one that drifts three times.
+  /// listed with itself twice or more, before those (edge_marks.hpp).
   std::vector<std::string> observed_with;
 
   [[nodiscard]] bool empty() const {
@@ -42,16 +44,23 @@ struct PathCorrelation {
   }
 };
 
-/// Whether an edge is dynamic, as a lookup of edges says.
-[[nodiscard]] inline bool is_moving(const std::string& id, const PathCorrelation& correlation) {
-  const auto& with = correlation.observed_with;
-  return with.size() >= 2 && with[0] == id && with[1] == id;
+/// How often a lookup of edges lists an edge with itself.
+[[nodiscard]] inline std::size_t marks_of(const std::string& id, const PathCorrelation& of) {
+  const auto& with = of.observed_with;
+  const auto is_other = [&](const std::string& one) { return one != id; };
+  return static_cast<std::size_t>(std::find_if(with.begin(), with.end(), is_other) - with.begin());
 }
-
-/// Whether a dynamic edge drifts, as a lookup of edges says.
-[[nodiscard]] inline bool is_drifting(const std::string& id, const PathCorrelation& correlation) {
-  return is_moving(id, correlation) && correlation.observed_with.size() >= 3 &&
-         correlation.observed_with[2] == id;
+/// Whether an edge is dynamic, as a lookup of edges says.
+[[nodiscard]] inline bool is_moving(const std::string& id, const PathCorrelation& of) {
+  return marks_of(id, of) >= 2;
+}
+/// Whether a dynamic edge drifts.
+[[nodiscard]] inline bool is_drifting(const std::string& id, const PathCorrelation& of) {
+  return marks_of(id, of) >= 3;
+}
+/// Whether observations have corrected the value of one that drifts.
+[[nodiscard]] inline bool is_corrected(const std::string& id, const PathCorrelation& of) {
+  return marks_of(id, of) >= 4;
 }
 
 [[nodiscard]] Belief belief_of(const Transform& X, const PathCorrelation& correlation);

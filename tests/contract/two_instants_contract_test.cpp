@@ -1,6 +1,8 @@
 // The uncertainty of a pose between two instants: an edge on both ways has one error, or one that
 // is not known to be another. Closed forms.
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -97,6 +99,57 @@ TEST_CASE("two instants: the errors of a dynamic edge may be correlated in any w
   CHECK(robot.variances("base", 2, 3, "odom")[0] == Approx(0.02 * 0.02));
   CHECK(robot.bound);
   CHECK(robot.variances("base", 3, 3, "odom").cwiseAbs().maxCoeff() < 1e-15);
+}
+
+// In one dimension: the deviation grows by 10 mm in a second, from 2 mm on. The edge is observed at
+// the third sample, to 3 mm; of the way from before to after that nobody knows the correlation.
+TEST_CASE("two instants: what an edge has drifted up to its first observation counts") {
+  constexpr double kStart = 0.002;
+  constexpr double kRate = 0.01;
+  constexpr double kSeen = 0.003;
+  const auto join = testing::join_loopback();
+  FrameSpec wheel{"wheel", "world", {Pose(), of_deviations(kStart, 0)}};
+  wheel.timing.emplace().drifts = true;
+  wheel.timing->process_noise = of_deviations(kRate, 0);
+  Node node = Node::open(join("base"), "base", {{"world", "", {}}, wheel}).value();
+  Client client = Client::open(join("")).value();
+  const auto sample = [&](int second) {
+    return node.update("wheel", {Pose(), of_deviations(kStart, 0)}, *at(second).at).has_value();
+  };
+  for (const int second : {1, 2, 3}) REQUIRE(sample(second));
+  const auto seen = node.observe("world", "wheel", {Pose(), of_deviations(kSeen, 1)}, at(3).at);
+  REQUIRE(seen);
+  REQUIRE(seen->accepted);
+  for (const int second : {4, 6}) REQUIRE(sample(second));
+  // Of the errors at each second from the first on, before and after.
+  const auto prior = [&](int i, int k) {
+    return kStart * kStart + kRate * kRate * (std::min(i, k) - 1);
+  };
+  const auto posterior = [&](int i, int k) {
+    return prior(i, k) - prior(i, 3) * prior(k, 3) / (prior(3, 3) + kSeen * kSeen);
+  };
+  for (Client* one : {&client, static_cast<Client*>(&node)}) {
+    for (int a = 1; a < 6; ++a) {
+      for (int b = a + 1; b <= 6; ++b) {
+        INFO(a << " to " << b);
+        const double right = posterior(a, a) + posterior(b, b) - 2 * posterior(a, b);
+        const auto X = one->lookup("wheel", at(a), "wheel", at(b), "world");
+        REQUIRE(X);
+        const double claimed = X->covariance.of_specified().matrix()(0, 0);
+        CHECK(claimed > right * (1 - 1e-9));
+        const bool over = a < 3 && b >= 3;
+        CHECK(X->basis.bound == over);
+        if (!over) CHECK(claimed < right * 1.5);
+        VelocityQuery query;
+        query.over = std::chrono::seconds(b - a);
+        query.at = *at(a).at + query.over / 2;
+        const auto velocity = one->velocity("world", "wheel", query);
+        REQUIRE(velocity);
+        const double per_second = velocity->covariance.of_specified().matrix()(0, 0);
+        CHECK(per_second * (b - a) * (b - a) > right * (1 - 1e-9));
+      }
+    }
+  }
 }
 
 }  // namespace tfdude
