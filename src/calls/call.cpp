@@ -11,6 +11,13 @@ namespace {
 // Before a call that was denied is planned again; then twice as long.
 constexpr Milliseconds kFirstPause{5};
 
+// An owner that hangs has the request, and cannot know that nobody waits for its answer any more.
+void say_what_may_follow(const Part& part, Reply& reply) {
+  auto* error = std::get_if<Error>(&reply.body);
+  if (error == nullptr || error->code != Errc::kUnreachable || !is_change(part.request)) return;
+  error->message += "; if it only hangs, it may still apply the change";
+}
+
 }  // namespace
 
 bool may_appear(Errc code) { return is_unknown(code) || code == Errc::kNotConnected; }
@@ -66,6 +73,8 @@ void Call::ask() {
 void Call::replied(Clock::time_point now) {
   std::vector<Reply> replies = requests_->take_replies();
   requests_.reset();
+  for (std::size_t i = 0; i < replies.size(); ++i)
+    say_what_may_follow(task_.parts()[i], replies[i]);
   if (task_.changes()) note_changes(replies);
   taken_ = task_.take(std::move(replies), now);
   if (!changes_.empty()) {

@@ -20,6 +20,7 @@
 namespace tfdude {
 
 using namespace std::chrono_literals;
+using testing::Approx;
 using testing::ContainsSubstring;
 using testing::ThesisDaemons;
 using Clock = std::chrono::steady_clock;
@@ -59,6 +60,30 @@ TEST_CASE("bounds: a lookup ends at its maximum wait although a daemon hangs") {
     INFO("wait " << k);
     CHECK(beyond[k] < 20ms);
   }
+}
+
+// Its caller has given up, and may have done something else instead.
+TEST_CASE("bounds: a daemon that hung does not apply what came meanwhile, and then all others") {
+  ThesisDaemons d;
+  auto client = Client::open(d.domain.options()).value();
+  REQUIRE(client.update("hand_left", testing::along_x(1)));
+  const auto x = [&] { return client.lookup("world", "hand_left", {}, 20'000ms).value(); };
+  const double before = x().pose.translation().x();
+  d.arms->freeze();
+  const auto moved = client.update("hand_left", testing::along_x(2));
+  REQUIRE_FALSE(moved);
+  CHECK_THAT(moved.error().message, ContainsSubstring("'arms'"));
+  const auto added = client.add("late", "world", {}, "arms");
+  REQUIRE_FALSE(added);
+  // Long enough, whenever it has looked last.
+  const auto frozen = Clock::now();
+  REQUIRE(testing::eventually([&] { return Clock::now() - frozen > 500ms; }));
+  d.arms->signal(SIGCONT);
+  CHECK(x().pose.translation().x() == before);
+  CHECK_FALSE(client.exists("late"));
+  CHECK(testing::eventually(
+      [&] { return client.update("hand_left", testing::along_x(3)).has_value(); }));
+  CHECK(x().pose.translation().x() == Approx(before + 2));
 }
 
 TEST_CASE("bounds: a flush names the daemon that hangs and has not acknowledged") {

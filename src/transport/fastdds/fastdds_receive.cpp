@@ -26,8 +26,11 @@ void FastDdsTransport::take_request(const wire::Request& sample, const ertps::Gu
                                             " may " + attempt_of(*request) + " in partition " +
                                             quote(options_.partition));
   }
-  // The sender repeats it; by then it is decided which process serves.
-  if (request && is_change(*request) && peers_.may_be_replaced()) return;
+  // The sender repeats it, if it still waits; by then it is decided which process serves.
+  const auto is_dropped = [this] {
+    return peers_.may_be_replaced() || peers_.was_held_up(Peers::Clock::now());
+  };
+  if (request && is_change(*request) && is_dropped()) return;
   if (request) {
     handler_->on_request(peer, *request);
     return;

@@ -102,6 +102,11 @@ bool Peers::may_be_replaced() const {
   return is_held_up || (held_up_ && now - *held_up_ < 2 * kProofWithin);
 }
 
+bool Peers::was_held_up(Clock::time_point now) const {
+  const Lock lock(mutex_);
+  return now - last_look_ > patience_.look_every + kLate || (went_on_ && now - *went_on_ < kTaken);
+}
+
 std::vector<IncompatiblePeer> Peers::incompatible() const {
   std::vector<IncompatiblePeer> servers;
   if (!any_incompatible_) return servers;
@@ -179,6 +184,7 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
   const auto late =
       std::max(now - std::exchange(last_look_, now) - planned, Clock::duration::zero());
   if (late >= kReplaceable) held_up_ = now;
+  if (late >= kLate) went_on_ = now;
   bool ask_rivals = false;
   for (auto& [id, server] : servers_) {
     server.heard.pass_over(late);

@@ -66,6 +66,10 @@ class Peers {
   /// For another process to take the partition, this one must have been silent for longer
   /// (Claiming).
   static constexpr std::chrono::milliseconds kReplaceable{300};
+  /// If this participant looks so late, others may count it as lost.
+  static constexpr std::chrono::milliseconds kLate{200};
+  /// After that, what has come meanwhile has been taken within this time.
+  static constexpr std::chrono::milliseconds kTaken{100};
 
   /// @param there  a peer announced what it serves, or is heard again
   /// @param gone   a peer that had announced this, or sent a page, has left or is silent; if it
@@ -138,6 +142,10 @@ class Peers {
   /// then no change may be accepted until that is decided. O(1) while nobody says so.
   [[nodiscard]] bool may_be_replaced() const;
 
+  /// Whether this process could not run for so long that those who have asked it meanwhile may have
+  /// given up. Whoever has not asks again.
+  [[nodiscard]] bool was_held_up(Clock::time_point now) const;
+
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
   /// announced what they serve, and none hears more others than this participant knows. For one
   /// that serves nothing, some server must do more than claim a partition.
@@ -204,6 +212,7 @@ class Peers {
   std::string own_ TFDUDE_GUARDED_BY(mutex_);  // the partition served here; empty: none yet
   std::atomic<bool> any_doubted_{false};
   std::optional<Clock::time_point> held_up_ TFDUDE_GUARDED_BY(mutex_);  // for kReplaceable
+  std::optional<Clock::time_point> went_on_ TFDUDE_GUARDED_BY(mutex_);  // after kLate
   // Set once, before anybody is discovered.
   Patience patience_{};
   bool is_server_ = false;

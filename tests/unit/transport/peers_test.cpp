@@ -152,6 +152,24 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   CHECK_FALSE(one.peers.any_silent());
 }
 
+// Who has asked meanwhile may have given up.
+TEST_CASE("a participant that looks late was held up, until it has taken what came meanwhile") {
+  using std::chrono::milliseconds;
+  Observer one;
+  one.look(milliseconds(300));
+  const auto last = one.now - milliseconds(30);
+  CHECK_FALSE(one.peers.was_held_up(last + kRarely + Peers::kLate));
+  CHECK(one.peers.was_held_up(last + kRarely + Peers::kLate + milliseconds(1)));
+  const auto late = last + kRarely + Peers::kLate;
+  (void)one.peers.look_for_silent(late, kRarely, {});
+  CHECK(one.peers.was_held_up(late + Peers::kTaken / 2));
+  CHECK_FALSE(one.peers.was_held_up(late + Peers::kTaken));
+  // A little late it may be.
+  const auto next = late + kRarely + Peers::kLate / 2;
+  (void)one.peers.look_for_silent(next, kRarely, {});
+  CHECK_FALSE(one.peers.was_held_up(next + milliseconds(1)));
+}
+
 TEST_CASE("a rival for the own partition is reported once it has answered") {
   constexpr std::chrono::milliseconds kSoon{300};
   Observer arms;
