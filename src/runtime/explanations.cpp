@@ -121,8 +121,12 @@ void Explanations::divide(const std::string& a, const std::string& b, const WhyQ
   explanation.is_rotation = functional.is_rotation;
   const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
   explanation.variance = functional.gradient.dot(sigma * functional.gradient);
-  PathEdgesTask task(structure_.forest, a, b, X_AB.stamp);
-  if (!requests_.run(task, deadline)) return;
+  PathEdgesTask at_stamp(structure_.forest, a, b, X_AB.stamp);
+  PathEdgesTask newest(structure_.forest, a, b, std::nullopt);
+  const bool has_all = requests_.run(at_stamp, deadline).has_value();
+  // The latest common time leaves out an edge without a sample.
+  if (!has_all && (query.at || !requests_.run(newest, deadline))) return;
+  const PathEdgesTask& task = has_all ? at_stamp : newest;
   Eigen::Matrix<double, 6, 1> sensor;
   for (Eigen::Index i = 0; i < 6; ++i) {
     const double stddev = query.sensor[static_cast<std::size_t>(i)];
@@ -194,7 +198,8 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     const HistoryInfo& history = histories->front();
     // A static edge is listed if it has rejected samples.
     if (!history.dynamic()) continue;
-    owners.dynamic.push_back({edges[i].id, parts[i].partition, history.oldest, history.newest});
+    owners.dynamic.push_back(
+        {edges[i].id, parts[i].partition, history.oldest, history.newest, history.refused_ahead});
   }
   return owners;
 }
@@ -374,6 +379,10 @@ void Explanations::explain_time(Owners owners, const WhyQuery& query, const Dead
     cause.partition = edge.partition;
     cause.since = obstacle == Obstacle::kBeginsAfter ? edge.oldest : edge.newest;
     cause.needs = std::move(needs);
+    if (edge.ahead == 0 || obstacle == Obstacle::kBeginsAfter) return;
+    cause.needs +=
+        "; rejected so far, as too far ahead of the owner's clock: " + std::to_string(edge.ahead) +
+        ", so whoever sends them may have another clock";
   };
   if (none != nullptr) {
     blame(Obstacle::kNoSample, *none, "a first sample of the edge of " + quote(none->id));

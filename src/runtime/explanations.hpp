@@ -34,6 +34,7 @@ class Explanations {
     std::string partition;
     std::optional<Time> oldest;
     std::optional<Time> newest;
+    std::uint64_t ahead = 0;  // rejected: too far ahead of the owner's clock
   };
   // What the owners of a path say.
   struct Owners {

@@ -292,6 +292,40 @@ TEST_CASE("why: an edge without a sample is no cause if its first value holds") 
   CHECK(why.cause->frame != "middle_pivot");
 }
 
+TEST_CASE("why: an answer beside an edge that had no sample yet is divided, too") {
+  const auto join = testing::join_loopback();
+  const auto of = [](double deviation) {
+    Transform X;
+    X.covariance = Covariance::from_stddev({deviation, deviation, deviation, 0, 0, 0}).value();
+    return X;
+  };
+  FrameSpec eye{"eye", "base", of(0.001)};
+  eye.timing.emplace().moving = true;
+  Node robot =
+      Node::open(join("robot"), "robot", {{"map", "", {}}, {"base", "map", of(0.01)}, eye}).value();
+  REQUIRE(robot.update("base", of(0.01), instant(0)));
+  const Explanation why = Client::open(join("")).value().why("map", "eye");
+  REQUIRE_FALSE(why.cause);
+  REQUIRE(why.edges.size() == 2);
+  CHECK(why.edges[0].name == "base");
+  CHECK(why.best);
+}
+
+TEST_CASE("why: it says that samples were rejected, as of another clock") {
+  const auto join = testing::join_loopback();
+  Node robot =
+      Node::open(join("robot"), "robot", {{"map", "", {}}, {"base", "map", Transform()}}).value();
+  const Time now = robot.now().value();
+  REQUIRE(robot.update("base", Transform(), now));
+  REQUIRE_FALSE(robot.update("base", Transform(), now + std::chrono::minutes(2)));
+  WhyQuery query;
+  query.at = now + std::chrono::seconds(1);
+  const Explanation why = robot.why("map", "base", query);
+  REQUIRE(why.cause);
+  CHECK(why.cause->obstacle == Obstacle::kEndsBefore);
+  CHECK_THAT(why.cause->needs, ContainsSubstring("too far ahead of the owner's clock: 1"));
+}
+
 TEST_CASE("why: the clock of an owner without a dynamic edge on the path is no cause") {
   const auto join = testing::join_loopback();
   const Node base =
