@@ -18,7 +18,8 @@ Result<Structure> Structure::of(Source source) {
   if (!partitions) return tl::unexpected(std::move(partitions.error()));
   Structure all{*std::move(frames), {}, {}};
   for (PartitionInfo& partition : *partitions) {
-    if (!partition.complete) all.incomplete.push_back(partition.name);
+    // Others have been asked for the frames of one that was lost.
+    if (!partition.complete && partition.reachable) all.incomplete.push_back(partition.name);
     if (!partition.reachable && partition.compatible()) all.absent.push_back(std::move(partition));
   }
   return all;

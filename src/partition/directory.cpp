@@ -391,7 +391,8 @@ std::vector<PartitionInfo> Directory::partitions() const {
   for (auto one = partitions_.begin() + 1; one != partitions_.end(); ++one) {
     if (!one->listed()) continue;
     all.push_back(one->info);
-    all.back().complete = without_pages_ || !one->info.reachable || one->complete();
+    const bool never_came = !one->info.reachable && one->live == 0;
+    all.back().complete = without_pages_ || (!never_came && one->complete());
   }
   std::sort(all.begin(), all.end(),
             [](const PartitionInfo& a, const PartitionInfo& b) { return a.name < b.name; });

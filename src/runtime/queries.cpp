@@ -160,7 +160,9 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
   if (!structure_.forest.exists(id)) {
     if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
   }
-  return structure_.forest.children(id);
+  auto found = structure_.forest.children(id);
+  if (found || !may_appear(found.error().code)) return found;
+  return tl::unexpected(discovery_.explained(std::move(found.error())));
 }
 
 Result<std::vector<std::string>> Queries::roots() {

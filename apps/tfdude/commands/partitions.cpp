@@ -44,7 +44,7 @@ std::string partition_table(const std::vector<PartitionRow>& rows) {
                       ", this program speaks " + to_string(kProtocolVersion) + "\n");
       continue;
     }
-    if (!partition.complete) {
+    if (!partition.complete && partition.reachable) {
       text += painted(Look::kWarning, "  has not sent all of its frames\n");
     }
     if (partition.clock == ClockKind::kExternal) text += "  external clock\n";

@@ -28,7 +28,8 @@ struct PartitionInfo {
   bool in_memory =
       false;  ///< lookups read its frames in its memory; otherwise they ask it over DDS
   std::string why_not_in_memory{};  ///< a sentence without its end; empty: they do, or it is own
-  /// If reachable: all frames that it has announced have come here.
+  /// All frames that it has announced have come here. If it is not reachable, it was lost after
+  /// that.
   bool complete = true;
 
   /// Whether its protocol is understood here. If not, only its name and versions are known.
