@@ -11,6 +11,7 @@
 #include "tfdude/math/transform_spec.hpp"
 
 #include "../numbers.hpp"
+#include "typed_stamp.hpp"
 
 namespace tfdude::cli {
 namespace {
@@ -280,6 +281,8 @@ Result<Json> SampleReader::read_row(const std::string& line) const {
     const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
     if (column == "stamp_ns" && digits) {
       object[column] = std::strtoull(text.c_str(), nullptr, 10);
+    } else if (const auto exact = parse_stamp(text, Time{}); column == "stamp" && exact) {
+      object["stamp_ns"] = static_cast<std::uint64_t>(nanoseconds(*exact));
     } else if (column == "stamp" || column == "stamp_ns") {
       object[column] = number;
     } else if (!edges_) {

@@ -166,6 +166,7 @@ Result<std::string> colmap(const Frames& frames) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const FrameSpec& frame = frames[i];
     if (has_blank(frame.id)) return refused(frame, "images.txt cannot have a name with a space");
+    if (frame.id == "world") return refused(frame, "images.txt is read below a frame of this name");
     if (frame.parent != frames.front().parent) {
       return refused(frame, "images.txt needs all frames in " + quote(frames.front().parent));
     }
@@ -226,6 +227,7 @@ Result<std::string> g2o(const Frames& frames) {
   std::vector<std::string> ids;
   std::vector<std::string> roots;
   for (const FrameSpec& frame : frames) {
+    if (frame.id == "map") return refused(frame, "g2o files are read below a frame of this name");
     if (poses.emplace(frame.parent, Pose()).second) {
       ids.push_back(frame.parent);
       roots.push_back(frame.parent);

@@ -113,6 +113,16 @@ TEST_CASE("samples: CSV has joints in columns, or one edge in each line") {
   CHECK_THAT(refusal(edges, "tool,1,2,3,0,0,0,2,5"), ContainsSubstring("edge 'tool'"));
 }
 
+TEST_CASE("samples: a stamp in CSV is exact to the nanosecond") {
+  SampleReader reader(kRadian);
+  CHECK(reader.read("stamp,elbow").value() == std::nullopt);
+  for (const std::int64_t ns : {1'795'000'000'123'456'789, 1'795'000'000'000'000'001}) {
+    std::string digits = std::to_string(ns);
+    digits.insert(digits.size() - 9, ".");
+    CHECK(read(reader, digits + ",0.5").stamp == time_of(ns));
+  }
+}
+
 TEST_CASE("samples: wrong names of CSV columns are named") {
   const std::pair<const char*, const char*> wrong[] = {
       {"elbow,elbow", "column 'elbow' is given twice"},

@@ -241,6 +241,21 @@ TEST_CASE("frame file: the camera in the IMU is read, as OpenVINS writes it") {
                  ", T_cn_cnm1: [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n") == "imu0>cam0 imu0>cam1 ");
 }
 
+TEST_CASE("frame file: a frame that has the name of the reader's own reference is not written") {
+  const auto refusal_of = [](const std::string& id, FrameFormat format) {
+    Transform X;
+    X.covariance = Covariance::from_stddev({1, 1, 1, 1, 1, 1}).value();
+    return write_frames({{id, "earth", X}}, format);
+  };
+  for (const auto& [id, format] :
+       {std::pair("map", FrameFormat::kG2o), std::pair("world", FrameFormat::kColmap)}) {
+    const auto refused = refusal_of(id, format);
+    REQUIRE_FALSE(refused);
+    CHECK_THAT(refused.error().message, ContainsSubstring("below a frame of this name"));
+    CHECK(refusal_of("odom", format));
+  }
+}
+
 TEST_CASE("frame file: of COLMAP only images.txt is read, and each image once") {
   const std::string image = "1 1 0 0 0 1 2 3 1 p.jpg\n\n";
   CHECK(edges_of(image) == "world>p.jpg ");
