@@ -1,6 +1,7 @@
 # Installs a build to a fresh prefix, then configures, builds and runs a project that uses the package:
 #   cmake -D BUILD_DIR=... -D CONFIG=... -D CXX=... [-D CXX_FLAGS=...] -P run.cmake
 set(work ${BUILD_DIR}/install_test)
+string(TOUPPER "${CONFIG}" config)
 file(REMOVE_RECURSE ${work})
 
 function(run)
@@ -21,6 +22,7 @@ run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${work}/build -G Ninja
   -D CMAKE_BUILD_TYPE=${CONFIG}
   -D CMAKE_CXX_COMPILER=${CXX}
   -D CMAKE_CXX_FLAGS=${CXX_FLAGS}
+  -D CMAKE_CXX_FLAGS_${config}=-O0
   -D CMAKE_PREFIX_PATH=${work}/moved
   -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
 run(${CMAKE_COMMAND} --build ${work}/build)
