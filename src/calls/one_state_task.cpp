@@ -21,8 +21,8 @@ bool is_before(const SegmentValues& earlier, const SegmentValues& later) {
 
 bool says_the_same(const SegmentValues& one, const SegmentValues& other) {
   const auto is_as = [](const PathCorrelation& a, const PathCorrelation& b) {
-    const bool knows_as_little =
-        a.unknown && b.unknown ? a.unknown->upper() == b.unknown->upper() : !a.unknown && !b.unknown;
+    const bool knows_as_little = a.unknown && b.unknown ? a.unknown->upper() == b.unknown->upper()
+                                                        : !a.unknown && !b.unknown;
     return knows_as_little && a.common_errors == b.common_errors &&
            a.observed_with == b.observed_with;
   };

@@ -78,14 +78,13 @@ Span span_of(const Cursor& cursor) {
 }
 
 bool is_same_way(const std::vector<EdgeFromFixed>& one, const std::vector<EdgeFromFixed>& other) {
-  return std::equal(one.begin(), one.end(), other.begin(), other.end(),
-                    [](const EdgeFromFixed& a, const EdgeFromFixed& b) {
-                      return a.id == b.id && a.up == b.up;
-                    });
+  return std::equal(
+      one.begin(), one.end(), other.begin(), other.end(),
+      [](const EdgeFromFixed& a, const EdgeFromFixed& b) { return a.id == b.id && a.up == b.up; });
 }
 
-// Of edges that are on both ways, if the way to the earlier instant is not to be had any more in the
-// state of the later one: what has no history was all the time as it is by then.
+// Of edges that are on both ways, if the way to the earlier instant is not to be had any more in
+// the state of the later one: what has no history was all the time as it is by then.
 void take_what_rests(const std::vector<EdgeFromFixed>& later, std::vector<EdgeFromFixed>& earlier) {
   for (EdgeFromFixed& edge : earlier) {
     const auto same = std::find_if(later.begin(), later.end(),

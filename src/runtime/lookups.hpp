@@ -86,6 +86,11 @@ class Lookups final : private LookupHost {
     if (memory_ != nullptr) memory_->asked(parts);
   }
 
+  /// Whether data for the instant is missing, and nothing else.
+  static bool is_of_time(const Error& error) {
+    return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
+  }
+
   /// As PendingLookups::pause().
   [[nodiscard]] bool pause(Deadline::Clock::time_point until) { return pending_.pause(until); }
 
@@ -115,9 +120,6 @@ class Lookups final : private LookupHost {
     auto X_AB = reads ? look(*memory_) : look(own);
     if (reads && !X_AB) X_AB = look(own);
     return X_AB;
-  }
-  static bool is_of_time(const Error& error) {
-    return error.code == Errc::kNotYet || error.code == Errc::kTooOld;
   }
 
   [[nodiscard]] Result<StampedTransform> elsewhere(std::string_view a, std::string_view b,

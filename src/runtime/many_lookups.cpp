@@ -17,8 +17,6 @@ auto answers(const std::vector<ManyLookups::Found>& all) {
   return std::count_if(all.begin(), all.end(), [](const auto& one) { return one.has_value(); });
 }
 
-bool is_of_time(Errc code) { return code == Errc::kNotYet || code == Errc::kTooOld; }
-
 }  // namespace
 
 std::vector<ManyLookups::Found> ManyLookups::lookup_once(const std::vector<FramePair>& pairs,
@@ -91,7 +89,7 @@ Result<Trajectory> ManyLookups::trajectory_once(std::string_view a, std::string_
     at.at = instants[i];
     if (from && to) {
       const auto found = lookups_.read(*from, *to, at);
-      if (found || is_of_time(found.error().code)) {
+      if (found || Lookups::is_of_time(found.error())) {
         all.add(i++, found);
         continue;
       }

@@ -50,9 +50,9 @@ Result<void> check_once(std::vector<PathEnds> segments) {
     return std::tie(a.from, a.to) < std::tie(b.from, b.to);
   };
   std::sort(segments.begin(), segments.end(), by_names);
-  const auto twice = std::adjacent_find(
-      segments.begin(), segments.end(),
-      [&](const PathEnds& a, const PathEnds& b) { return !by_names(a, b); });
+  const auto twice =
+      std::adjacent_find(segments.begin(), segments.end(),
+                         [&](const PathEnds& a, const PathEnds& b) { return !by_names(a, b); });
   if (twice == segments.end()) return {};
   return fail(Errc::kInvalidInput, "the segment from " + quote(twice->from) + " to " +
                                        quote(twice->to) + " is asked for twice");

@@ -49,7 +49,9 @@ class Participant;
 ///   only.
 /// @par Errors  Every function may also fail with kUnreachable (a partition concerned is known to
 ///   be down), kTimeout (the message names the partition that did not answer in time) or kNotOwner
-///   (the structure kept changing during the request). The functions below do not list these.
+///   (the structure kept changing during the request). The functions below do not list these. A
+///   change that failed with one of the first two may have been applied, or will be when an owner
+///   that hung goes on.
 /// @par Waiting  Functions that read and have a parameter `wait` wait at most so long for missing
 ///   frames and data, as lookup() does. Zero: they do not wait for those.
 /// @par Time bounds  Each call has one deadline for all that it waits for: discovery, requests and
