@@ -134,6 +134,13 @@ Matrix6d difference(const Covariance& own, const CommonErrors& common_errors) {
   return root * root.transpose();
 }
 
+// Of translation, or of rotation.
+double trace(const Covariance& S, std::size_t first) {
+  double sum = 0;
+  for (std::size_t i = first; i < first + 3; ++i) sum += S.upper()[upper_index(i, i)];
+  return sum;
+}
+
 Matrix6d sum_of(const Covariance& own, const CommonErrors& common_errors) {
   if (any_subtracts(common_errors)) return difference(own, common_errors);
   return nearest_semidefinite(own.matrix() + second_moment(common_errors));
@@ -205,11 +212,6 @@ Transform collapse(const Belief& X_AB) {
 }
 
 BoundWeights bound_weights(const Covariance& A, const Covariance& B) {
-  const auto trace = [](const Covariance& S, std::size_t first) {
-    double sum = 0;
-    for (std::size_t i = first; i < first + 3; ++i) sum += S.upper()[upper_index(i, i)];
-    return sum;
-  };
   double a = 0;
   double b = 0;
   for (const std::size_t first : {std::size_t{0}, std::size_t{3}}) {
@@ -222,6 +224,20 @@ BoundWeights bound_weights(const Covariance& A, const Covariance& B) {
   if (a <= 0 || b <= 0) return {1.0, 1.0};
   const double root = std::sqrt(b / a);
   return {1.0 + root, 1.0 + 1.0 / root};
+}
+
+std::vector<double> bound_weights(const std::vector<Covariance>& all) {
+  std::vector<double> roots(all.size(), 0.0);
+  for (const std::size_t first : {std::size_t{0}, std::size_t{3}}) {
+    double sum = 0;
+    for (const Covariance& one : all) sum += trace(one, first);
+    if (sum <= 0) continue;
+    for (std::size_t k = 0; k < all.size(); ++k) roots[k] += trace(all[k], first) / sum;
+  }
+  double sum = 0;
+  for (double& one : roots) sum += one = std::sqrt(one);
+  for (double& one : roots) one = one > 0 ? sum / one : 1.0;
+  return roots;
 }
 
 Covariance bound(const Covariance& A, const Covariance& B) {

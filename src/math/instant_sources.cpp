@@ -11,11 +11,12 @@
 namespace tfdude {
 namespace {
 
-// Besides, there are the prefix, an observation's name or a stamp, and a number.
+// Besides, there are the prefix, an observation's name or stamps, and a number.
 constexpr std::size_t kMostBytes = 160;
 
 constexpr char kOf = '=';
 constexpr char kAt = '@';
+constexpr char kBetween = '#';
 
 // By a name that differs from others that begin so.
 std::string shortened(std::string_view source) {
@@ -29,19 +30,63 @@ std::string shortened(std::string_view source) {
          std::to_string(std::hash<std::string_view>()(source));
 }
 
-// Of two parts, those named as `said` itself and those of its instants.
-struct Sides {
-  Covariance itself;
-  Covariance of_instants;
+// The errors of one source, by what may be correlated in any way.
+class Sides {
+ public:
+  void add(std::string_view name, const Covariance& sigma) {
+    const std::string_view side = side_of(name);
+    const std::size_t k = find(side);
+    if (k == names_.size()) {
+      names_.push_back(side);
+      sums_.emplace_back();
+    }
+    sums_[k] += sigma;
+  }
+
+  /// Once all are added. @return whether several are not zero
+  [[nodiscard]] bool weigh() {
+    weights_ = bound_weights(sums_);
+    const auto counts = [](const Covariance& sigma) {
+      return !(sigma.upper() == Covariance::Upper{});
+    };
+    return std::count_if(sums_.begin(), sums_.end(), counts) > 1;
+  }
+  /// By what the square of such an error counts.
+  [[nodiscard]] double weight(std::string_view name) const { return weights_[find(side_of(name))]; }
+
+ private:
+  // What observations have left of several instants counts as independent.
+  static std::string_view side_of(std::string_view name) {
+    if (is_between_samples(name)) return name;
+    return said_source(name).empty() ? std::string_view() : kObservedPrefix;
+  }
+  [[nodiscard]] std::size_t find(std::string_view side) const {
+    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), side) - names_.begin());
+  }
+
+  std::vector<std::string_view> names_;
+  std::vector<Covariance> sums_;
+  std::vector<double> weights_;
 };
 
-bool is_without_loading(const Covariance& sigma) { return sigma.upper() == Covariance::Upper{}; }
+bool is_of(std::string_view name, std::string_view said) {
+  return said_source(name) == said || is_source_itself(name, said);
+}
 
 }  // namespace
 
 std::string instant_source(std::string_view source, Time stamp) {
   return std::string(kObservedPrefix) + kAt + std::to_string(nanoseconds(stamp)) + kOf +
          shortened(source);
+}
+
+std::string source_between(std::string_view source, Time before, Time after) {
+  return std::string(kObservedPrefix) + kBetween + std::to_string(nanoseconds(before)) + ',' +
+         std::to_string(nanoseconds(after)) + kOf + shortened(source);
+}
+
+bool is_between_samples(std::string_view name) {
+  return !said_source(name).empty() && name[kObservedPrefix.size()] == kBetween;
 }
 
 std::string merged_source(std::string_view observation, std::string_view source) {
@@ -94,27 +139,21 @@ bool join_instant(std::vector<CommonError>& common_errors, Time stamp) {
 }
 
 bool allow_any_relation(std::vector<CommonError>& common_errors) {
-  std::vector<std::string> done;
+  std::vector<std::string_view> done;
   bool any = false;
-  for (std::size_t k = 0; k < common_errors.size(); ++k) {
-    const std::string said(said_source(common_errors[k].source));
+  for (const CommonError& first : common_errors) {
+    const std::string_view said = said_source(first.source);
     if (said.empty() || std::count(done.begin(), done.end(), said) > 0) continue;
     done.push_back(said);
     Sides sides;
-    const auto each = [&](const auto& take) {
-      for (CommonError& one : common_errors) {
-        if (said_source(one.source) == said) take(one, sides.of_instants, false);
-        if (is_source_itself(one.source, said)) take(one, sides.itself, true);
-      }
-    };
-    each([](const CommonError& one, Covariance& side, bool) {
-      side += Covariance::trusted(Matrix6d(one.loading * one.loading.transpose()));
-    });
-    if (is_without_loading(sides.itself) || is_without_loading(sides.of_instants)) continue;
-    const BoundWeights weights = bound_weights(sides.itself, sides.of_instants);
-    each([&](CommonError& one, Covariance&, bool itself) {
-      one.loading *= std::sqrt(itself ? weights.of_A : weights.of_B);
-    });
+    for (const CommonError& one : common_errors) {
+      if (!is_of(one.source, said)) continue;
+      sides.add(one.source, Covariance::trusted(Matrix6d(one.loading * one.loading.transpose())));
+    }
+    if (!sides.weigh()) continue;
+    for (CommonError& one : common_errors) {
+      if (is_of(one.source, said)) one.loading *= std::sqrt(sides.weight(one.source));
+    }
     any = true;
   }
   return any;
@@ -127,15 +166,15 @@ Covariance sum_of_sources(const std::vector<OfSource>& parts, bool& bounded) {
     const std::string_view said = said_source(parts[k].first);
     if (said.empty() || taken[k]) continue;
     Sides sides;
+    for (const OfSource& one : parts) {
+      if (is_of(one.first, said)) sides.add(one.first, one.second);
+    }
+    bounded = sides.weigh() || bounded;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      const bool itself = is_source_itself(parts[i].first, said);
-      if (!itself && said_source(parts[i].first) != said) continue;
-      (itself ? sides.itself : sides.of_instants) += parts[i].second;
+      if (!is_of(parts[i].first, said)) continue;
+      sum += Covariance::trusted(Matrix6d(sides.weight(parts[i].first) * parts[i].second.matrix()));
       taken[i] = true;
     }
-    bounded =
-        bounded || !(is_without_loading(sides.itself) || is_without_loading(sides.of_instants));
-    sum += bound(sides.itself, sides.of_instants);
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     if (!taken[k]) sum += parts[k].second;

@@ -11,7 +11,8 @@
 
 // A source that dynamic edges name is one error an instant. What an observation leaves of it on
 // other edges is the error of that instant only, under a name of its own. How this is correlated
-// with the source at other instants, and on edges that were not observed, is not known.
+// with the source at other instants, and on edges that were not observed, is not known. Neither is
+// it how errors at one instant are that come from samples with different stamps.
 namespace tfdude {
 
 /// The name of a source's error at an instant, the same for all observations of that instant.
@@ -23,6 +24,12 @@ namespace tfdude {
 
 /// Another name for the error of one instant, which says that it may be merged with others.
 [[nodiscard]] std::string as_merged(std::string_view of_one_instant);
+
+/// The name of a source's error in what is interpolated, or extrapolated, from these two samples.
+[[nodiscard]] std::string source_between(std::string_view source, Time before, Time after);
+
+/// Whether it is such a name.
+[[nodiscard]] bool is_between_samples(std::string_view name);
 
 /// The source of whose error at some instants this is; empty: of none. Long names are
 /// shortened.
@@ -40,8 +47,8 @@ namespace tfdude {
 /// At an instant, its error of a source is the source's. @return whether there was one
 bool join_instant(std::vector<CommonError>& common_errors, Time stamp);
 
-/// Makes errors of a source, and of the same source at some instants, as large as suffices for any
-/// correlation of both. @return whether there were any
+/// Makes errors of a source, of the same source at some instants, and of each two samples, as large
+/// as suffices for any correlation of these. @return whether there were any
 bool allow_any_relation(std::vector<CommonError>& common_errors);
 
 /// A covariance with the name of the source that it comes from.

@@ -106,6 +106,13 @@ class PathAccumulation<Belief> {
     common_errors_ = common_errors;
   }
 
+  /// The common errors of the next edge; null: none.
+  [[nodiscard]] const std::vector<CommonError>* next_errors() const { return common_errors_; }
+  /// Gives it these instead.
+  void replace_next(const std::vector<CommonError>& common_errors) {
+    common_errors_ = &common_errors;
+  }
+
   void up(const Transform& X_PC);
   void up_between(const TransformParts& X0, const TransformParts& X1, double s);
   [[nodiscard]] Transform& place() {

@@ -1,8 +1,12 @@
 #include "partition/assembly.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
+
+#include "math/common_errors.hpp"
+#include "math/instant_sources.hpp"
 
 namespace tfdude {
 namespace {
@@ -16,6 +20,32 @@ void each_segment(const LookupPlan& plan, Take take) {
                                    [&](const Part& asked) { return asked.owner == segment.owner; });
     const auto i = static_cast<std::size_t>(part - plan.parts.begin());
     take(i, taken[i]++);
+  }
+}
+
+// A source that lasts has one error, also between samples.
+void join_samples(const std::string& source, std::vector<CommonError>& errors) {
+  bool any = false;
+  for (CommonError& one : errors) {
+    if (!is_between_samples(one.source)) continue;
+    if (!is_source_itself(source, said_source(one.source))) continue;
+    one.source = source;
+    any = true;
+  }
+  if (!any) return;
+  std::vector<CommonError> joined;
+  add_errors(errors, joined);
+  errors = std::move(joined);
+}
+
+// What an answer names that has no instant is of static edges: it lasts.
+void join_lasting(const std::vector<SegmentValues>& answers, std::vector<CommonError>& errors) {
+  if (!has_instants(errors)) return;
+  for (const SegmentValues& answer : answers) {
+    if (answer.stamp) continue;
+    for (const PathCorrelation& correlation : answer.correlations) {
+      for (const CommonError& one : correlation.common_errors) join_samples(one.source, errors);
+    }
   }
 }
 
@@ -37,6 +67,7 @@ StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValue
           k < answers[i].correlations.size() ? answers[i].correlations[k] : none;
       X_AB = compose(X_AB, belief_of(answers[i].values[k], correlation), order);
     });
+    join_lasting(answers, X_AB.common_errors);
     return collapsed(X_AB, order, stamp);
   }
   StampedTransform X_AB{Transform::exact({}), stamp, {}};

@@ -11,6 +11,7 @@
 #include "tree/forest.hpp"
 #include "tree/held_edge.hpp"
 #include "tree/revised_sample.hpp"
+#include "tree/source_instants.hpp"
 
 // The value of one edge at an instant, for a walk along a path. The edge is one that is held here
 // (OwnEdge), or in the memory of another process (RemoteEdge), where stamps may be any numbers.
@@ -104,13 +105,34 @@ struct Moment {
   bool common;              // as of PathLookup::Instant
   std::uint64_t back = 0;   // see SampleHistory::around()
   bool correlated = false;  // a sample has a correlation of its own
+  SourceInstants* sources = nullptr;
 };
+
+// Tells from which samples the error of the edge comes that is accumulated next.
+template <class Value>
+void tell_instants(PathAccumulation<Value>& path, const Moment& moment, FromSamples from) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    const std::vector<CommonError>* errors = path.next_errors();
+    if (errors == nullptr || moment.sources == nullptr) return;
+    path.replace_next(moment.sources->met(*errors, from));
+  }
+}
+
+// The same, if its instant is that of a sample.
+template <class Value, class Samples>
+void tell_instant(PathAccumulation<Value>& path, const Moment& moment, const Samples& samples) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    tell_instants(path, moment, samples.drifts() ? kLasting : FromSamples{moment.t, moment.t});
+  }
+}
 
 // Accumulates a value that was computed, and has drifted for some time since.
 template <class Value, class Samples>
 Result<void> accumulate_correlated(PathAccumulation<Value>& path, const CorrelatedValue& value,
-                                   const Samples& samples, double seconds) {
+                                   const Samples& samples, double seconds, const Moment& moment,
+                                   FromSamples from) {
   correlate_next(path, &value.correlation);
+  tell_instants(path, moment, samples.drifts() ? kLasting : from);
   Transform& X = path.place();
   X = value.X_PC;
   if (samples.has_noise()) add_noise(X, samples, seconds);
@@ -145,7 +167,8 @@ Result<void> accumulate_beyond(PathAccumulation<Value>& path, const Edge& from, 
       const bool drifts = samples.drifts();
       const CorrelatedValue ahead =
           extrapolate_correlated(before, newest, edge.X_PC, s, said, drifts ? &walk : nullptr);
-      return accumulate_correlated(path, ahead, samples, drifts ? seconds(moment.age) : noise);
+      return accumulate_correlated(path, ahead, samples, drifts ? seconds(moment.age) : noise,
+                                   moment, {before.stamp, edge.stamp});
     }
   }
   OfEdge<Value>& X = path.place();
@@ -177,10 +200,12 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
   const bool noisy = samples.has_noise();
   TransformParts first{};
   TransformParts second{};
+  const FromSamples both{begin, found.after->stamp};
   typename Edge::Copy copy;
   if (!noisy && !samples.drifts() && samples.given_parts(*found.before, first) &&
       samples.given_parts(*found.after, second)) {
     if (!correlate_as_said(path, from, copy)) return not_readable();
+    tell_instants(path, moment, both);
     path.up_between(first, second, s);
     return {};
   }
@@ -197,7 +222,7 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
       if (!from.find_said(copy, said)) return not_readable();
       const Walk walk{samples.process_noise(), span * 1e-9};
       const CorrelatedValue X = drifted_between(before, after, s, said, walk);
-      return accumulate_correlated(path, X, samples, seconds(moment.age));
+      return accumulate_correlated(path, X, samples, seconds(moment.age), moment, both);
     }
   }
   if constexpr (std::is_same_v<Value, Belief>) {
@@ -205,10 +230,11 @@ Result<void> accumulate_between(PathAccumulation<Value>& path, const Edge& from,
       const Correlation* said = nullptr;
       if (!from.find_said(copy, said)) return not_readable();
       const CorrelatedValue X = interpolate_observed(before, after, s, said);
-      return accumulate_correlated(path, X, samples, noise);
+      return accumulate_correlated(path, X, samples, noise, moment, both);
     }
   }
   if (!correlate_as_said(path, from, copy)) return not_readable();
+  tell_instants(path, moment, both);
   OfEdge<Value>& X = path.place();
   interpolate(before, after, s, X);
   if (noisy) add_noise(X, samples, noise);
@@ -223,6 +249,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const Edge& from, Mome
   const std::int64_t t = moment.t;
   if (t > edge.stamp) {
     if (moment.common && edge.unsampled()) {
+      tell_instants(path, moment, {t, t});
       path.up(value_of<Value>(edge));
       return {};
     }
@@ -230,6 +257,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const Edge& from, Mome
   }
   const auto samples = from.samples();
   if (t == edge.stamp) {
+    tell_instant(path, moment, samples);
     accumulate_sample(path, samples, value_of<Value>(edge), moment.age);
     return {};
   }
@@ -245,6 +273,7 @@ Result<void> accumulate_at(PathAccumulation<Value>& path, const Edge& from, Mome
     const Correlation* said = nullptr;
     if (!from.find_said(copy, said)) return not_readable();
     correlate_next(path, correlation_at(*found.before, said));
+    tell_instant(path, moment, samples);
   }
   OfEdge<Value>& X = path.place();
   X = value_of<Value>(*found.before);

@@ -26,7 +26,9 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
   const bool bounded = X.unknown || allow_any_relation(errors);
   StampedTransform found{collapse(X), stamp, {order, bounded, {}}};
   std::vector<std::string>& sources = found.basis.sources;
-  for (const CommonError& common_error : X.common_errors) sources.push_back(common_error.source);
+  for (const auto& [source, subtracts, loading] : X.common_errors) {
+    sources.emplace_back(is_between_samples(source) ? said_source(source) : source);
+  }
   std::sort(sources.begin(), sources.end());
   sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
   return found;

@@ -88,16 +88,18 @@ bool leaves_out_correlation(const HeldVersion& edge) {
   return std::is_same_v<Value, Transform> && edge.correlation != nullptr;
 }
 
-/// X_AB at an instant.
+/// X_AB at an instant. @param sources  null: errors of sources have the names that edges say
 template <class Value, class Others>
-Result<void> walk_at(const Ends& ends, PathLookup::Absent absent, const PathLookup::Instant& at,
-                     const Query& query, Others& others, PathLookup::Met& met, Value& X_AB) {
+Result<void> walk_once_at(const Ends& ends, PathLookup::Absent absent,
+                          const PathLookup::Instant& at, const Query& query, Others& others,
+                          SourceInstants* sources, PathLookup::Met& met, Value& X_AB) {
   std::int64_t age = 0;
   if (query.age_noise_until) {
     age = std::max(saturating_subtract(nanoseconds(*query.age_noise_until), at.t), age);
   }
   // An edge without samples is behind every instant.
   Moment moment{std::max(at.t, kNoSample + 1), age, query, at.common};
+  moment.sources = sources;
   const auto take = [&](auto& path, const auto& from) -> Result<void> {
     const HeldVersion& edge = *from.version;
     if (leaves_out_correlation<Value>(edge)) met.correlated = true;
@@ -107,10 +109,24 @@ Result<void> walk_at(const Ends& ends, PathLookup::Absent absent, const PathLook
       met.correlated = met.correlated || (std::is_same_v<Value, Transform> && moment.correlated);
       return taken;
     }
+    tell_instants(path, moment, kLasting);
     if (!met.correlated) path.up(value_of<Value>(edge));
     return {};
   };
   return walk(ends, absent, query.order, others, take, X_AB);
+}
+template <class Value, class Others>
+Result<void> walk_at(const Ends& ends, PathLookup::Absent absent, const PathLookup::Instant& at,
+                     const Query& query, Others& others, PathLookup::Met& met, Value& X_AB) {
+  if constexpr (std::is_same_v<Value, Belief>) {
+    if (absent != PathLookup::Absent::kBeyondEdge) {
+      SourceInstants sources;
+      auto found = walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
+      if (!found || !sources.begin_naming(absent == PathLookup::Absent::kMayPass)) return found;
+      return walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
+    }
+  }
+  return walk_once_at(ends, absent, at, query, others, nullptr, met, X_AB);
 }
 
 /// X_AB at the latest common time: that of the newest sample of Met::limiting.

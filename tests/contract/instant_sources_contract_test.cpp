@@ -6,12 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
 #include "support/networks.hpp"
+#include "support/process.hpp"
 
 // All is on one line, so that errors are linear in what disturbs: each is found from one run an
 // independent disturbance, without any model of the filter.
@@ -234,6 +236,56 @@ TEST_CASE("instants: a joint that others mimic has another error in its next sam
     CHECK(sigma("finger") < 2.1e-2);
     CHECK(sigma("thumb") >= std::sqrt(2e-4) * (1 - 1e-6));
   }
+}
+
+// Of two edges, only one has a sample at the step between.
+TEST_CASE("instants: a source of two owners does not cancel between samples of one of them") {
+  const int transport = GENERATE(from_range(testing::networks()));
+  const auto join = testing::joined_by(transport);
+  INFO("transport " << transport);
+  const auto open = [&](const std::string& id) {
+    FrameSpec frame{id, "world", Transform::exact({})};
+    frame.timing = EdgeTiming();
+    std::vector<FrameSpec> frames = {frame};
+    if (id == "left") frames.insert(frames.begin(), {"world", "", {}});
+    Node node = Node::open(join(id), id, frames).value();
+    REQUIRE(node.correlate(id, {false, {{"supply", false, loading(kSupply)}}, {}}));
+    return node;
+  };
+  Node left = open("left");
+  Node right = open("right");
+  Client client = Client::open(join("")).value();
+  for (const int step : {0, 2}) REQUIRE(left.update("left", Transform::exact({}), at(step)));
+  for (const int step : {0, 1}) REQUIRE(right.update("right", Transform::exact({}), at(step)));
+  const auto watched = client.watch("left", "right");
+  REQUIRE(watched);
+  const auto check = [](const Result<StampedTransform>& X, bool same) {
+    REQUIRE(X);
+    const double sigma = std::sqrt(X->covariance.if_complete()->upper()[0]);
+    CHECK(sigma == Approx(same ? 0 : 2 * kSupply).margin(1e-9));
+    CHECK(X->basis.bound == !same);
+    CHECK(X->basis.sources == std::vector<std::string>{"supply"});
+  };
+  Query between;
+  between.at = at(1);
+  REQUIRE(testing::eventually([&] { return client.lookup("left", "right", between).has_value(); }));
+  REQUIRE(testing::eventually([&] { return watched->lookup(between).has_value(); }));
+  check(client.lookup("left", "right", between), false);
+  REQUIRE(testing::eventually([&] { return left.lookup("left", "right", between).has_value(); }));
+  check(left.lookup("left", "right", between), false);
+  check(watched->lookup(between), false);
+  check(client.lookup("left", "right", Query{}), false);
+  REQUIRE(right.update("right", Transform::exact({}), at(2)));
+  const auto newest = [&](const auto& X) { return X && X->stamp == at(2); };
+  REQUIRE(testing::eventually([&] { return newest(client.lookup("left", "right", Query{})); }));
+  REQUIRE(testing::eventually([&] { return newest(watched->latest()); }));
+  check(client.lookup("left", "right", Query{}), true);
+  check(watched->latest(), true);
+  // A static edge makes the source last, and so on all of the path.
+  Node post = Node::open(join("post"), "post", {{"post", "world", Transform::exact({})}}).value();
+  REQUIRE(post.correlate("post", {false, {{"supply", false, loading(kSupply)}}, {}}));
+  REQUIRE(testing::eventually([&] { return client.lookup("left", "post", between).has_value(); }));
+  check(client.lookup("left", "post", between), true);
 }
 
 }  // namespace

@@ -38,6 +38,16 @@ TEST_CASE("The error of a source at an instant has a name that tells the source"
   }
 }
 
+TEST_CASE("A source's errors between samples have the name of both stamps") {
+  const std::string name = source_between("joint a=b@c", at(3), at(7));
+  CHECK(said_source(name) == "joint a=b@c");
+  CHECK(is_between_samples(name));
+  CHECK_FALSE(is_of_one_instant(name));
+  CHECK_FALSE(is_between_samples(instant_source("joint a=b@c", at(7))));
+  CHECK_FALSE(is_between_samples("joint a"));
+  CHECK(name != source_between("joint a=b@c", at(3), at(8)));
+}
+
 TEST_CASE("Long names of sources are told apart") {
   std::string one;
   for (int i = 0; i < 127; ++i) one += "ü";
@@ -70,6 +80,13 @@ TEST_CASE("A source and its error at some instants may be correlated in any way"
   CHECK(variance({error("a", 0), error(then, 1)}) == Approx(1));
   CHECK(variance({error(before, 3), error(then, 4)}) == Approx(25));
   CHECK(variance({error("a", 5), error(before, 3), error(then, 4)}) == Approx(100));
+  // Each two samples are a side of their own.
+  const std::string here = source_between("a", at(3), at(7));
+  const std::string beside = source_between("a", at(5), at(8));
+  CHECK(variance({error(here, 3), error(beside, 4)}) == Approx(49));
+  CHECK(variance({error("a", 5), error(here, 3), error(beside, -4)}) == Approx(144));
+  CHECK(variance({error("b", 5), error(here, 3)}) == Approx(34));
+  CHECK(variance({error("a", 0), error(here, 3), error(then, 4)}) == Approx(49));
   const std::vector<OfSource> parts = {
       {"a", Covariance::trusted(Matrix6d(Matrix6d::Identity()))},
       {"b", Covariance::trusted(Matrix6d(Matrix6d::Identity()))},
