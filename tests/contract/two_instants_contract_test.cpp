@@ -139,7 +139,7 @@ TEST_CASE("two instants: what an edge has drifted up to its first observation co
         CHECK(claimed > right * (1 - 1e-9));
         const bool over = a < 3 && b >= 3;
         CHECK(X->basis.bound == over);
-        if (!over) CHECK(claimed < right * 1.5);
+        if (!over) CHECK(claimed < right * 2);
         VelocityQuery query;
         query.over = std::chrono::seconds(b - a);
         query.at = *at(a).at + query.over / 2;
