@@ -132,7 +132,8 @@ TEST_CASE("A source is counted also at an instant between samples") {
   const Transform still = Transform::exact(robot.X_WA.pose);
   REQUIRE(robot.forest.update("a", still, at(0ms)));
   REQUIRE(robot.forest.update("a", still, at(10ms)));
-  REQUIRE(robot.forest.update("b", still, at(3ms)));
+  REQUIRE(robot.forest.update("b", still, at(0ms)));
+  REQUIRE(robot.forest.update("b", still, at(10ms)));
   Query query;
   query.at = at(3ms);
   const auto then = robot.forest.lookup("world", "b", query);
