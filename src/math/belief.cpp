@@ -235,7 +235,10 @@ std::vector<double> bound_weights(const std::vector<Covariance>& all) {
     for (std::size_t k = 0; k < all.size(); ++k) roots[k] += trace(all[k], first) / sum;
   }
   double sum = 0;
-  for (double& one : roots) sum += one = std::sqrt(one);
+  for (double& one : roots) {
+    one = std::sqrt(one);
+    sum += one;
+  }
   for (double& one : roots) one = one > 0 ? sum / one : 1.0;
   return roots;
 }

@@ -250,11 +250,9 @@ Result<void> Cursor::decode_values(const Message& message) {
   return ok;
 }
 
-// The next value "with the covariance as before" may mean one that could not be read.
-void Cursor::forget_covariances() {
-  decoder_ = ValuesDecoder(*edges_);
-  note("values with a covariance as before are left out from there on, until all is told again");
-}
+// The next value "with the covariance as before" may mean one that could not be read. It is left
+// out then, until all is told again.
+void Cursor::forget_covariances() { decoder_ = ValuesDecoder(*edges_); }
 
 Result<void> Cursor::decode_transforms(bool is_static, const Message& message) {
   auto transforms = decode_tf(message.data, *edges_);

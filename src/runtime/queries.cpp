@@ -140,6 +140,14 @@ Result<std::vector<Frame>> Queries::frames(const Deadline& deadline) {
   return frames;
 }
 
+bool Queries::others_know_missed(const std::vector<Frame>& all) {
+  const Lock lock(structure_.mutex);
+  const auto missed = structure_.directory.only_heard_of();
+  return !missed || std::any_of(all.begin(), all.end(), [&](const Frame& frame) {
+    return frame.partition == missed->name;
+  });
+}
+
 Result<std::vector<std::string>> Queries::children(std::string_view id) {
   if (auto ok = requests_.check_keeps_all("list children of frame " + quote(id)); !ok) {
     return tl::unexpected(std::move(ok.error()));
@@ -148,6 +156,7 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
   if (auto known = discovery_.await_known(deadline); !known) {
     return tl::unexpected(std::move(known.error()));
   }
+  bool is_certain = true;
   if (!knows_all()) {
     auto all = frames(deadline);
     if (!all) return tl::unexpected(std::move(all.error()));
@@ -155,13 +164,14 @@ Result<std::vector<std::string>> Queries::children(std::string_view id) {
     if (std::any_of(all->begin(), all->end(), is_it)) {
       return ids_of(*all, [&](const Frame& frame) { return frame.attached && frame.parent == id; });
     }
+    is_certain = others_know_missed(*all);
   }
   // The frame may be one of those that have not come yet.
   if (!structure_.forest.exists(id)) {
     if (auto all = discovery_.await(deadline); !all) return tl::unexpected(std::move(all.error()));
   }
   auto found = structure_.forest.children(id);
-  if (found || !may_appear(found.error().code)) return found;
+  if (found || is_certain || !may_appear(found.error().code)) return found;
   return tl::unexpected(discovery_.explained(std::move(found.error())));
 }
 

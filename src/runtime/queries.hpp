@@ -52,6 +52,8 @@ class Queries {
   [[nodiscard]] Result<std::vector<Frame>> followed(const Deadline& deadline);
   /// Whether no partition was lost before all of its frames were known here.
   [[nodiscard]] bool knows_all();
+  /// Whether others have told frames of a partition that was lost before. @param all  frames()
+  [[nodiscard]] bool others_know_missed(const std::vector<Frame>& all);
   /// Of the wanted frames those that owners know, if a partition was lost before this process
   /// started.
   [[nodiscard]] std::vector<KnownFrame> frames_before(const FramesRequest& wanted,

@@ -81,6 +81,10 @@ class Forest::Impl {
   [[nodiscard]] bool may_be_moving(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
     return edge.samples != nullptr || default_timing_.moving;
   }
+  /// Whether a value without a stamp is a sample, with the time of its arrival.
+  [[nodiscard]] bool is_timed(const HeldVersion& edge) const TFDUDE_REQUIRES(mutex_) {
+    return edge.moving() || timing_of(edge).moving;
+  }
 
   /// Updates all as one commit, or none; `frame` gives the id or the handle of an update.
   template <class Update, class Frame>

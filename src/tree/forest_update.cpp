@@ -55,7 +55,7 @@ Result<std::int64_t> Forest::Impl::stamp_for(const HeldVersion* const* edges, st
   std::int64_t newest = kAlways;
   for (std::size_t i = 0; i < count; ++i) {
     const HeldVersion& edge = *edges[i];
-    if (!may_be_moving(edge)) continue;
+    if (!is_timed(edge)) continue;
     if (moving == nullptr) moving = &edge;
     // A clock may have restarted with the process.
     if (!edge.left_behind()) newest = std::max(newest, edge.stamp);
@@ -251,7 +251,7 @@ Result<void> Forest::Impl::update_all(const std::vector<Update>& edges, Frame fr
     reclaimer_.prefetch_held(kPrefetched);
     const std::uint32_t slot = to_update_[i]->slot;
     // Without a stamp, a static edge stays static beside others.
-    const bool timed = stamp || may_be_moving(*to_update_[i]);
+    const bool timed = stamp || is_timed(*to_update_[i]);
     push_value(slot, {edges[i].X_PC, state_of(edges[i])}, timed ? *at : kAlways);
     if (!stamp && timed) mark_made_up(slot);
     if (const Correlation* said = correlation_of(edges[i])) say_correlation(slot, *said);

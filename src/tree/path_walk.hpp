@@ -209,6 +209,10 @@ Result<void> compute_newest(const Ends& ends, Others& others, Value& X_AB) {
         if (newest && whole.unknown) return not_readable();
       }
       if (met.moving) join_instant(whole.common_errors, time_of(met.limiting->stamp));
+      if constexpr (!Others::kNone) {
+        auto errors = whole.common_errors;
+        if (newest && has_instants(errors) && allow_any_relation(errors)) return not_readable();
+      }
       X_AB = collapse(whole);
     }
   }

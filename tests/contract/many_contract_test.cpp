@@ -59,7 +59,7 @@ const std::vector<FramePair> kPairs = {{"world", "tip"},  {"tip", "world"}, {"ba
                                        {"mast", "hand"},  {"arm", "arm"},   {"elbow", "tip"},
                                        {"world", "base"}, {"mast", "base"}, {"world", "hand"}};
 
-// A client that counts its lookups on the wire.
+// A client that counts its lookups on the wire, and so reads no memory.
 struct Counting {
   explicit Counting(TransportPtr transport)
       : client(Client::open(std::make_unique<testing::LossyRequests>(
@@ -67,8 +67,14 @@ struct Counting {
                                 [this](const Request& request) {
                                   if (std::holds_alternative<LookupRequest>(request.body)) ++asked;
                                   return false;
-                                }))
+                                }),
+                            by_requests())
                    .value()) {}
+  static ClientOptions by_requests() {
+    ClientOptions options;
+    options.shared_memory = false;
+    return options;
+  }
   std::atomic<int> asked{0};
   Client client;
 };

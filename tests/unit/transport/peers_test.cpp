@@ -152,7 +152,7 @@ TEST_CASE("a silent peer is replaced once a later process serves its partition")
   CHECK_FALSE(one.peers.any_silent());
 }
 
-// Who has asked meanwhile may have given up.
+// Those that have asked meanwhile may have given up.
 TEST_CASE("a participant that looks late was held up, until it has taken what came meanwhile") {
   using std::chrono::milliseconds;
   Observer one;

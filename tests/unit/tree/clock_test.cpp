@@ -113,6 +113,9 @@ TEST_CASE("clock: one that was far ahead does not keep the values behind that fo
   std::vector<std::string> restarted;
   sim.forest.on_restart([&](const HistoryRestart& one) { restarted.push_back(one.id); });
   const auto newest = [&] { return sim.forest.histories("arm").at(0).newest; };
+  EdgeTiming timing;
+  timing.moving = true;
+  REQUIRE(sim.forest.set_timing("mast", timing));
   sim.now = ms(3'600'000);
   REQUIRE(sim.forest.update({{"arm", along_x(1)}, {"mast", along_x(1)}}));
   // A little behind: the sample is replaced until the clock has caught up.
