@@ -289,6 +289,21 @@ TEST_CASE("What an observation has corrected is left out once its newest sample 
   CHECK(asked().correlations[0].unknown);
 }
 
+// To tell them may take a walk over all samples of the edge.
+TEST_CASE(
+    "The rows of an edge are told once a request, and its value as often as it is asked for") {
+  Forest forest;
+  REQUIRE(forest.add("world", "", {}));
+  REQUIRE(forest.add("a", "world", {}));
+  const std::vector<PathEnds> twice{{"world", "a"}, {"a", "world"}, {"world", "a"}};
+  const auto refused = forest.lookup_segments(twice, {}, std::nullopt, true, Rows::kOfPath);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == Errc::kInvalidInput);
+  CHECK(refused.error().message == "the segment from 'world' to 'a' is asked for twice");
+  CHECK(forest.lookup_segments(twice, {}, std::nullopt, true));
+  CHECK(forest.lookup_segments({{"world", "a"}}, {}, std::nullopt, true, Rows::kOfPath));
+}
+
 TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
   Random random(657);
   INFO("seed " << random.seed());
