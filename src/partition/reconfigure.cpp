@@ -155,6 +155,27 @@ std::vector<ConfiguredChange> configured_changes(const StoredState& state,
   return changes;
 }
 
+std::set<std::string> left_static(const StoredState& state,
+                                  const std::vector<FrameSpec>& configured) {
+  std::map<std::string_view, const FrameSpec*> before;
+  for (const FrameSpec& frame : state.configured) before.emplace(frame.id, &frame);
+  std::set<std::string> left;
+  for (const StoredFrame& frame : state.frames) {
+    const auto entry = before.find(frame.id);
+    if (entry == before.end() || frame.time.stamp || frame.time.cleared) continue;
+    const FrameSpec& was = *entry->second;
+    const bool moved = was.parent != frame.parent;
+    const FrameSpec now{frame.id, frame.parent, frame.X_PC};
+    if (moved || (!was.joint && !same_edge(was, now, state.omitted_was_exact))) {
+      left.insert(frame.id);
+    }
+  }
+  for (const ConfiguredChange& change : configured_changes(state, configured)) {
+    if (change.kind != Kind::kCorrelate) left.erase(change.frame);
+  }
+  return left;
+}
+
 std::string describe(const ConfiguredChange& change) {
   std::string frame = "frame " + quote(change.frame);
   const std::string under = change.parent.empty() ? " as a root" : " under " + quote(change.parent);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ namespace tfdude {
 /// by id. O(n log n) of the frames.
 [[nodiscard]] std::vector<ConfiguredChange> configured_changes(
     const StoredState& state, const std::vector<FrameSpec>& configured);
+
+/// The frames that requests have moved or added again, and that have had no sample since, if their
+/// entries are as before: they are static until their next sample. O(n log n) of the frames.
+[[nodiscard]] std::set<std::string> left_static(const StoredState& state,
+                                                const std::vector<FrameSpec>& configured);
 
 /// The stored joint positions that are still valid: those of joints that the configuration
 /// describes, except a joint whose unit has changed between rotation and translation, joints that

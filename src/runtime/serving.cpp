@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <random>
+#include <set>
 #include <unistd.h>
 
 #include "tfdude/base/id.hpp"
@@ -117,7 +118,7 @@ Result<void> Serving::take_frames(const std::vector<FrameSpec>& frames) {
     member_.partition()->limit_frames(options_.limits.frames);
   }
   log_configured(state, frames);
-  return set_timings(frames);
+  return set_timings(frames, left_static(state, frames));
 }
 
 void Serving::limit_history() {
@@ -130,12 +131,14 @@ void Serving::limit_history() {
   });
 }
 
-Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames) {
+Result<void> Serving::set_timings(const std::vector<FrameSpec>& frames,
+                                  const std::set<std::string>& left_static) {
   for (const FrameSpec& frame : frames) {
     const bool declared = frame.timing || options_.history.moving;
     // A frame removed by request has no edge to set.
     if (!declared || !structure_.forest.holds(frame.id)) continue;
-    const EdgeTiming& timing = frame.timing ? *frame.timing : options_.history;
+    EdgeTiming timing = frame.timing ? *frame.timing : options_.history;
+    if (left_static.count(frame.id) != 0) timing.moving = false;
     auto set = structure_.forest.set_timing(frame.id, timing);
     // One that is being handed over has that of its former owner.
     if (!set && set.error().code != Errc::kNotOwner) return set;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,9 @@ class Serving {
   [[nodiscard]] Result<StoredState> open_store(std::unique_ptr<StateStore>& store);
   [[nodiscard]] Result<void> take_frames(const std::vector<FrameSpec>& frames);
   void limit_history();
-  [[nodiscard]] Result<void> set_timings(const std::vector<FrameSpec>& frames);
+  /// @param left_static  as left_static()
+  [[nodiscard]] Result<void> set_timings(const std::vector<FrameSpec>& frames,
+                                         const std::set<std::string>& left_static);
   void await_gone();
 
   Structure& structure_;

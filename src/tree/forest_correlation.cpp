@@ -143,15 +143,16 @@ ChangedEdge Forest::Impl::kept(const HeldVersion& edge) {
   ChangedEdge kept{
       std::string(edge.name->text), edge.X_PC, {}, {std::nullopt, edge.stamp == kNoSample}};
   if (edge.moving() && !edge.lacks_sample()) kept.time.stamp = tfdude::time_of(edge.stamp);
-  if (edge.correlation == nullptr) return kept;
-  kept.correlation.said = edge.correlation->said();
-  if (!edge.correlation->revised()) return kept;
-  kept.correlation.observed = edge.correlation->now();
+  if (edge.correlation != nullptr) {
+    kept.correlation.said = edge.correlation->said();
+    if (edge.correlation->revised()) kept.correlation.observed = edge.correlation->now();
+  }
   if (!kept.time.stamp) return kept;
   const Sample* newest = edge.samples->sample(edge.number);
-  if (newest != nullptr && newest->revision() != nullptr) {
-    kept.correlation.given = newest->revision()->given.pose;
-  }
+  if (newest == nullptr || newest->revision() == nullptr) return kept;
+  // Also one that was corrected beside exact edges, and so has nothing in common with others.
+  if (!kept.correlation.observed) kept.correlation.observed = kept.correlation.said;
+  kept.correlation.given = newest->revision()->given.pose;
   return kept;
 }
 
