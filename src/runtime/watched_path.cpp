@@ -13,6 +13,11 @@
 namespace tfdude {
 namespace {
 
+// Whether a watch asks for more history than edges have by default.
+bool keeps_more(const EdgeTiming& asked) {
+  return asked.span > EdgeTiming().span || asked.count > EdgeTiming().count;
+}
+
 // How long a frame's parent may be missing before the path counts as gone: news of the parent's
 // owner may come later than that of the frame's.
 constexpr Milliseconds kNotConnectedFor{500};
@@ -320,9 +325,9 @@ Result<void> WatchedPath::plan(const KnownStructure& known) {
   if (!route) return tl::unexpected(std::move(route.error()));
   planned_ = *std::move(route);
   // Of an edges' watch, other frames than those of the edges are unknown; composed segments cannot
-  // be told apart, wherever they are.
+  // be told apart, wherever they are. Owners keep what they keep: more must be kept here.
   planned_in_memory_ = others_ != nullptr && frames_.empty() && !options_.composed &&
-                       others_->can_watch(planned_.parts);
+                       !keeps_more(options_.timing) && others_->can_watch(planned_.parts);
   return {};
 }
 

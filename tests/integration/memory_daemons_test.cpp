@@ -203,6 +203,30 @@ TEST_CASE("memory: a watched path keeps the last values of an owner that dies, a
   CHECK(testing::x_of(d.dds.lookup(parent, "hand_left")) == 4);
 }
 
+TEST_CASE("memory: a watched path keeps as much as it was asked to, wherever it is read") {
+  testing::TestDomain domain;
+  FrameSpec tool{"tool", "base", {}};
+  tool.timing = EdgeTiming();
+  tool.timing->span = std::chrono::seconds(2);
+  tool.timing->max_ahead = std::chrono::nanoseconds::max();
+  Node node = Node::open("arm", {{"base", "", {}}, tool}, domain.options()).value();
+  Client client = Client::open(domain.options()).value();
+  REQUIRE(eventually([&] { return all_in_memory(client); }));
+  WatchOptions options;
+  options.timing.span = std::chrono::seconds(60);
+  auto watch = client.watch("base", "tool", options).value();
+  auto plain = client.watch("base", "tool").value();
+  for (int s = 0; s <= 20; ++s) {
+    REQUIRE(node.update("tool", testing::along_x(s), at_ms(1000 * s)));
+    REQUIRE(eventually([&] { return watch.latest() && testing::x_of(watch.latest()) == s; }));
+  }
+  Query early;
+  early.at = at_ms(5000);
+  CHECK(testing::x_of(watch.lookup(early)) == 5);
+  // That of its owner, in whose memory it is read.
+  CHECK(outcome(plain.lookup(early)) == "too_old");
+}
+
 TEST_CASE("memory: a killed owner is unreachable at once, and its next process is read again") {
   Two d;
   REQUIRE(eventually([&] { return all_in_memory(d.memory); }));

@@ -139,7 +139,9 @@ struct WatchOptions {
   /// bytes, but the segment is interpolated as a whole between samples. kInvalidInput if it has
   /// process noise.
   bool composed = false;
-  /// How much history is kept here. Process noise is taken from the edge's owner, if it has one.
+  /// How much history is kept here. A path that is read in the memory of its owners has theirs, so
+  /// one for which more than the default is asked is not read there. Process noise is taken from
+  /// the edge's owner, if it has one.
   EdgeTiming timing{};
   /// Called when the route of the path has changed, or with the reason why there is none for now.
   /// One call at a time, from a library thread that holds no lock: it may call any function, also
