@@ -61,12 +61,17 @@ class Buffer {
   [[nodiscard]] tf2::TransformStamped lookupTransform(
       const std::string& target, const T& target_time, const std::string& source,
       const S& source_time, const std::string& fixed, const D& timeout = {}) const {
-    const Query at_target = query(tf2::detail::nanoseconds_of(target_time));
+    const tf2::Duration wait = tf2::detail::nanoseconds_of(timeout);
+    Query at_target = query(tf2::detail::nanoseconds_of(target_time));
     const Query at_source = query(tf2::detail::nanoseconds_of(source_time));
-    auto X = look_up_over(target, at_target, source, at_source, fixed,
-                          tf2::detail::nanoseconds_of(timeout));
+    if (!at_target.at) {
+      const auto newest = look_up(target, fixed, tf2::Duration(0), wait);
+      if (!newest) tf2::detail::raise(newest.error());
+      at_target.at = newest->stamp;
+    }
+    auto X = look_up_over(target, at_target, source, at_source, fixed, wait);
     if (!X) tf2::detail::raise(X.error());
-    if (at_target.at) X->stamp = at_target.at;
+    X->stamp = at_target.at;
     return message(target, source, *X, Time());
   }
 

@@ -183,17 +183,20 @@ def events(self: _core.Client) -> Events:
 
 
 async def _news(watch: _core.PathWatch) -> collections.abc.AsyncIterator[_core.StampedTransform]:
-    """The newest transform of a watch, each time that there is a new one."""
+    """The newest transform of a watch, each time that there is another one."""
     mailbox = _core._Mailbox()
     listening = watch._listen(mailbox)
     try:
-        seen = -1
+        seen, told = -1, None
         while not mailbox.ended:
             mailbox.take()
             messages = watch.messages
             if messages != seen:
                 seen = messages
-                yield watch.latest()
+                newest = watch.latest()
+                if newest != told:
+                    told = newest
+                    yield newest
             else:
                 await _until_readable(mailbox)
     finally:

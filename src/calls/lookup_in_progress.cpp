@@ -45,11 +45,11 @@ Result<std::vector<SegmentValues>> values_of(std::vector<Reply> replies) {
 Result<LookupInProgress> LookupInProgress::plan(const Forest& forest, const Directory& directory,
                                                 ClockKind own, const WantedLookup& wanted,
                                                 const SharedHints& hints, SharedHints::Steady now) {
-  const auto& [a, b, query] = wanted;
+  const Query& query = wanted.query;
   // Hints are for what is known now.
   const bool guesses = !query.at && !query.believed_at;
-  const auto hint = guesses ? hints.guess(a, b, now) : std::nullopt;
-  auto plan = route_lookup(forest, directory, a, b, query, hint);
+  const auto hint = guesses ? hints.guess(wanted.a, wanted.b, now) : std::nullopt;
+  auto plan = route_lookup(forest, directory, wanted.a, wanted.b, query, hint);
   if (!plan) return tl::unexpected(std::move(plan.error()));
   LookupInProgress lookup(*std::move(plan), wanted, hint, now);
   lookup.differs_ = other_clock(directory, own, lookup.parts());

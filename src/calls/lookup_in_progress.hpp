@@ -40,6 +40,8 @@ struct WantedLookup {
   std::string a;
   std::string b;
   Query query;
+  /// Waits for no frames and data that are missing, but until it is known that they are.
+  bool once = false;
 };
 
 /// The values in the owners' replies, in order, or the first error.

@@ -94,10 +94,11 @@ WaitingLookup::Answer WaitingLookup::go_on_asking(const Shared& shared, const Ne
 
 WaitingLookup::Answer WaitingLookup::judge(const Shared& shared, const News& news, Found found,
                                            bool far, Clock::time_point now) {
-  if (found || !is_worth_waiting(found.error(), wanted_.query)) return found;
+  if (found || !is_worth_waiting(shared, found.error())) return found;
   last_ = std::move(found.error());
   if (limit_.over(now)) return Found(tl::unexpected(shared.host.last_word(last_, limit_)));
-  far_ = far;
+  // Nothing tells that all is known.
+  far_ = far || wanted_.once;
   // What plan() would find may have changed during the request, and the data may have come.
   const bool again = forward_ == Forward::kAfterThis || version_ != news.version;
   if (forward_ == Forward::kAfterThis) {
@@ -108,6 +109,11 @@ WaitingLookup::Answer WaitingLookup::judge(const Shared& shared, const News& new
   next_ = again ? now : next_attempt(shared, news, now);
   if (far) hurry(shared, now);
   return std::nullopt;
+}
+
+bool WaitingLookup::is_worth_waiting(const Shared& shared, const Error& error) const {
+  if (wanted_.once) return may_appear(error.code) && !shared.host.knows_all();
+  return tfdude::is_worth_waiting(error, wanted_.query);
 }
 
 /// Owners that have pushed the wanted data are asked again at once.

@@ -29,6 +29,8 @@ class LookupHost {
   [[nodiscard]] virtual Result<LookupInProgress> plan(const WantedLookup& wanted) = 0;
   /// Whether plan() asks others for frames: nothing here tells when missing ones appear.
   [[nodiscard]] virtual bool asks_for_frames() const { return false; }
+  /// Whether frames that plan() does not find do not exist.
+  [[nodiscard]] virtual bool knows_all() { return true; }
   /// Whether the values pushed here would suffice: then their owners have them, too.
   [[nodiscard]] virtual bool was_pushed(const WantedLookup& wanted) const = 0;
   /// The error to return at the time limit: that of the last attempt, or that the result is not
@@ -99,6 +101,7 @@ class WaitingLookup {
   [[nodiscard]] Answer go_on_asking(const Shared& shared, const News& news, Clock::time_point now);
   [[nodiscard]] Answer judge(const Shared& shared, const News& news, Found found, bool far,
                              Clock::time_point now);
+  [[nodiscard]] bool is_worth_waiting(const Shared& shared, const Error& error) const;
   void hurry(const Shared& shared, Clock::time_point now);
   [[nodiscard]] Clock::time_point next_attempt(const Shared& shared, const News& news,
                                                Clock::time_point now) const;

@@ -72,15 +72,22 @@ Result<StampedTransform> Lookups::wait(std::string_view a, std::string_view b, c
       .get();
 }
 
+// As other calls, one that does not wait for data has Options::timeout to ask.
+Deadline Lookups::deadline_of(Milliseconds wait) const {
+  return wait > Milliseconds(0) ? Deadline(wait) : discovery_.call_deadline();
+}
+
 std::shared_ptr<void> Lookups::start(const std::string& a, const std::string& b, const Query& query,
                                      Milliseconds wait, PendingLookups::Callback callback) {
-  auto call = pending_.add({a, b, query}, Deadline(wait), not_asked_yet(a, b), std::move(callback));
+  auto call = pending_.add({a, b, query, wait <= Milliseconds(0)}, deadline_of(wait),
+                           not_asked_yet(a, b), std::move(callback));
   return {nullptr, [call](void*) { call->close(); }};
 }
 
 std::future<Result<StampedTransform>> Lookups::start(const std::string& a, const std::string& b,
                                                      const Query& query, Milliseconds wait) {
-  return pending_.add({a, b, query}, Deadline(wait), not_asked_yet(a, b));
+  return pending_.add({a, b, query, wait <= Milliseconds(0)}, deadline_of(wait),
+                      not_asked_yet(a, b));
 }
 
 }  // namespace tfdude

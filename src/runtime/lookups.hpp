@@ -100,9 +100,12 @@ class Lookups final : private LookupHost {
   void pushed() { pending_.pushed(); }
 
  private:
+  [[nodiscard]] Deadline deadline_of(Milliseconds wait) const;
+
   // LookupHost
   [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted) override;
   [[nodiscard]] bool asks_for_frames() const override { return requests_.on_demand() != nullptr; }
+  [[nodiscard]] bool knows_all() override { return discovery_.complete(); }
   [[nodiscard]] bool was_pushed(const WantedLookup& wanted) const override {
     return watches_.can_answer(wanted.a, wanted.b, wanted.query);
   }

@@ -185,6 +185,12 @@ TEST_CASE("tf2: messages as of ROS 1, a slash before frames, two times") {
   buffer.transform(pose, later, "follower", RosTime{11, 0}, "odom");
   CHECK(later.pose.position.x == Approx(-1));
   CHECK(later.header.stamp.sec == 11);
+  // Zero is the newest time of the target and the frame between; without one it stays zero.
+  buffer.transform(pose, later, "follower", RosTime{}, "odom");
+  CHECK(later.pose.position.x == Approx(-1));
+  CHECK(later.header.stamp.sec == 11);
+  buffer.transform(pose, later, "leader", RosTime{}, "map");
+  CHECK(later.header.stamp.sec == 0);
 }
 
 TEST_CASE("tf2: parts of what a lookup returns are those of messages") {

@@ -217,6 +217,29 @@ TEST_CASE("lookups: a frame is not called unknown before all participants are di
   CHECK(outcome(robot.client->lookup("world", "nobody", {}, 50ms)) == "unknown_end");
 }
 
+TEST_CASE("lookups: one without a wait asks once, and waits for nothing that is missing") {
+  Robot robot;
+  const auto now = [&](const char* b) {
+    const auto begin = Clock::now();
+    auto answer = robot.client->lookup_async("world", b, {}, 0ms).get();
+    CHECK(Clock::now() - begin < 900ms);
+    return outcome(answer);
+  };
+  CHECK(now("hand") == "ok");
+  CHECK(now("nobody") == "unknown_end");
+  Query future;
+  future.at = time_of(INT64_MAX / 2);
+  REQUIRE(robot.arm->update("hand", {}, time_of(1)));
+  CHECK(outcome(robot.client->lookup_async("world", "hand", future, 0ms).get()) == "not_yet");
+  // Frames that others may still announce are not called unknown.
+  Robot fresh;
+  fresh.ear->met_all = false;
+  auto early = fresh.client->lookup_async("world", "nobody", {}, 0ms);
+  CHECK(early.wait_for(50ms) == std::future_status::timeout);
+  fresh.ear->met_all = true;
+  CHECK(outcome(early.get()) == "unknown_end");
+}
+
 TEST_CASE("lookups: every call without a wait times out and never reports unknown too early") {
   Options options;
   options.timeout = Milliseconds(50);
