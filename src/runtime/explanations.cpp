@@ -101,7 +101,7 @@ Explanation Explanations::why(const std::string& a, const std::string& b, const 
   lookup.at = query.at;
   Explanation explanation;
   auto found = lookups_.lookup<std::string_view>(a, b, lookup, first);
-  if (!found && may_appear(found.error().code) && !discovery_.complete()) {
+  if (!found && found.error().code == Errc::kTimeout && !discovery_.complete()) {
     // Who has just joined hears last of partitions that are lost.
     found = lookups_.lookup<std::string_view>(a, b, lookup, deadline);
   }
