@@ -273,8 +273,14 @@ std::vector<std::string> Explanations::names_like(const std::string& id) {
 }
 
 void Explanations::explain_unknown(const std::string& id, Cause& cause) {
-  cause.obstacle = Obstacle::kUnknownFrame;
   cause.frame = id;
+  if (cause.error.code == Errc::kTimeout && !discovery_.complete()) {
+    cause.needs =
+        "a longer time limit: not all participants have told yet which frames they have, or have "
+        "lost";
+    return;
+  }
+  cause.obstacle = Obstacle::kUnknownFrame;
   cause.similar = names_like(id);
   if (!structure_.forest.frames().empty()) {
     cause.needs = "a frame " + quote(id) + ": add it, or start the partition that has it";

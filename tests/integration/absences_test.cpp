@@ -238,6 +238,15 @@ TEST_CASE("absences: a process that starts after an orderly stop is told of no l
   CHECK(reasons.count("lost") == 0);
 }
 
+TEST_CASE("absences: a program that asks why just after a loss never takes the frame for unknown") {
+  Robot robot;
+  robot.arm->kill();
+  const auto why = robot.domain.cli({"--timeout", "1000", "why", "world", "hand"});
+  INFO(why.out << why.err);
+  CHECK(why.status == 3);
+  CHECK_THAT(why.out, !ContainsSubstring("unknown frame"));
+}
+
 TEST_CASE("absences: ages by a clock that is an hour behind are said to be so") {
   const std::string fake = TFDUDE_FAKETIME;
   if (!std::filesystem::exists(fake)) {

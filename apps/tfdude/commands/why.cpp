@@ -7,6 +7,7 @@ namespace {
 
 int status_of(const Explanation& why) {
   if (!why.cause) return kDone;
+  if (why.cause->error.code == Errc::kTimeout) return kNoAnswer;
   switch (why.cause->obstacle) {
     case Obstacle::kOwnerLost:
     case Obstacle::kOwnerStopped:
