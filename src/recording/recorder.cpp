@@ -164,6 +164,8 @@ Result<void> Recorder::repeat(const std::string& name, Known& known, Time now) {
   ValuesEncoder encoder(message_, name, 0, true);
   for (std::size_t i = 0; i < known.edges.size(); ++i) {
     Edge& edge = known.edges[i];
+    // A reader that starts here has no covariance but those that follow.
+    edge.written.reset();
     if (!edge.newest) continue;
     encoder.add(known.frames[i], *edge.newest, false);
     const StatedCovariance& covariance = edge.newest->X_PC.covariance;

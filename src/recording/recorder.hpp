@@ -49,7 +49,8 @@ class Recorder {
  private:
   struct Edge {
     std::optional<WatchedValue> newest;  // with its process noise as the beginning of a history
-    std::optional<Covariance> written;   // the last covariance in the file
+    // The last covariance in the file, since the keyframe if there is one.
+    std::optional<Covariance> written;
   };
   struct Known {
     bool reachable = false;
