@@ -173,13 +173,21 @@ std::optional<Covariance::Upper>& ValuesDecoder::last_of(const RecordedEdge& edg
 }
 
 bool ValuesDecoder::decode_value(CdrReader& reader, RecordedValue& value) {
+  if (read_value(reader, value)) return true;
+  // The value may have had another covariance, which the next one of its edge does not repeat.
+  if (value.edge != nullptr) last_of(*value.edge).reset();
+  return false;
+}
+
+bool ValuesDecoder::read_value(CdrReader& reader, RecordedValue& value) {
   value.edge = decode_edge(reader);
   const std::int64_t stamp = reader.i64();
   const auto is = static_cast<CovarianceIs>(reader.u8());
   const auto begins = static_cast<Begins>(reader.u8());
   std::array<double, 7> pose{};
   reader.f64s(pose);
-  bool valid = value.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime;
+  bool valid = value.edge != nullptr && stamp >= kUnsampled && stamp <= kMaxTime &&
+               is <= CovarianceIs::kAsBefore;
   Covariance::Upper upper{};
   Covariance::Upper noise{};
   const bool given = read_upper(reader, upper, valid);

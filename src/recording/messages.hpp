@@ -108,12 +108,14 @@ class ValuesDecoder {
   explicit ValuesDecoder(EdgeTable& edges) : edges_(&edges) {}
 
   /// @param out  replaced, so that its memory can be used again; of no use after an error
-  /// @return kConfig: not a valid message; values that are not valid are left out
+  /// @return kConfig: not a valid message; values that are not valid are left out, as are those of
+  ///   their edges that follow with the covariance as before
   [[nodiscard]] Result<void> decode(std::string_view message, RecordedValues& out);
 
  private:
   // @return whether it is valid
   [[nodiscard]] bool decode_value(CdrReader& reader, RecordedValue& value);
+  [[nodiscard]] bool read_value(CdrReader& reader, RecordedValue& value);
   // Null: it is not valid.
   [[nodiscard]] const RecordedEdge* decode_edge(CdrReader& reader);
   [[nodiscard]] std::optional<Covariance::Upper>& last_of(const RecordedEdge& edge);

@@ -1,5 +1,6 @@
 // Covariances that a recording does not repeat.
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +64,40 @@ TEST_CASE("recording: after a keyframe a covariance is told again that it did no
   CHECK(variances(messages, keyframe) == std::vector<std::optional<double>>{0.25, 0.25});
   CHECK(variances(messages, 0) ==
         std::vector<std::optional<double>>{0.25, std::nullopt, 0.25, 0.25});
+}
+
+// A value with another covariance cannot be taken, and one with "the covariance as before" follows.
+TEST_CASE("recording: the covariance of a value that is left out is not that of one before") {
+  const WatchedFrame edge{"robot", "map"};
+  const auto taken = [&](const WatchedValue& left_out) {
+    std::string message;
+    ValuesEncoder encoder(message, "slam", 1, false);
+    encoder.add(edge, sample(1, stddev(0.5)), false);
+    encoder.add(edge, left_out, false);
+    encoder.add(edge, sample(3, stddev(2)), true);
+    encoder.add(edge, sample(4, stddev(2)), false);
+    encoder.add(edge, sample(5, stddev(2)), true);
+    encoder.finish();
+    return variances({message}, 0);
+  };
+  const std::vector<std::optional<double>> expected{0.25, 4, 4};
+  WatchedValue late = sample(2, stddev(2));
+  late.stamp = time_of(kMaxTime + 1);
+  CHECK(taken(late) == expected);
+  WatchedValue nameless = sample(2, stddev(2));
+  nameless.correlation.common_errors.push_back({"", false, Loading::Zero(6, 1)});
+  CHECK(taken(nameless) == expected);
+  WatchedValue begins = sample(2, stddev(2));
+  Covariance::Upper noise{};
+  noise[0] = -1;
+  begins.begins = Covariance::trusted(noise);
+  CHECK(taken(begins) == expected);
+  WatchedValue unclear = sample(2, stddev(2));
+  Covariance::Upper unknown{};
+  unknown[0] = std::numeric_limits<double>::quiet_NaN();
+  unclear.X_PC.covariance = Covariance::trusted(unknown);
+  CHECK(taken(unclear) == expected);
+  CHECK(taken(sample(2, stddev(1))) == std::vector<std::optional<double>>{0.25, 1, 1, 4, 4});
 }
 
 }  // namespace
