@@ -38,16 +38,20 @@ void set_correlation(PushedValue& entry, const PathCorrelation& correlation) {
   entry.X.covariance.set_complete(complete);
 }
 
-std::vector<PushedValue> entries_of(const SegmentValues& found) {
+// What a segment has of its edges' errors differs from pose to pose: it is that of a sample alone.
+std::vector<PushedValue> entries_of(const SegmentValues& found,
+                                    const std::vector<PathEnds>& segments) {
   std::vector<PushedValue> entries;
   for (std::uint32_t i = 0; i < found.values.size(); ++i) {
     entries.push_back({i, found.stamp, found.values[i], {}, found.history, {}});
-    entries.back().cleared = found.cleared;
-    entries.back().unsampled = found.unsampled;
+    PushedValue& entry = entries.back();
+    entry.cleared = found.cleared;
+    entry.unsampled = found.unsampled;
     // As for an edge: if one edge of a segment is unspecified, the segment is.
-    StatedCovariance& covariance = entries.back().X.covariance;
-    if (!covariance.complete()) covariance = StatedCovariance::unspecified();
-    if (!found.correlations.empty()) set_correlation(entries.back(), found.correlations[i]);
+    if (!entry.X.covariance.complete()) entry.X.covariance = StatedCovariance::unspecified();
+    if (!found.correlations.empty()) set_correlation(entry, found.correlations[i]);
+    if (!found.stamp || entry.correlation.empty()) continue;
+    entry.correlation.observed_with = {segments[i].to};
   }
   return entries;
 }
@@ -248,7 +252,8 @@ Result<PushedValues> WatchedGroup::composed(const Forest& forest, std::optional<
   }
   PushedValues pushed{id_, {}, 0, newest.commit};
   const auto add = [&](const SegmentValues& values) {
-    for (PushedValue& entry : entries_of(values)) pushed.entries.push_back(std::move(entry));
+    for (PushedValue& entry : entries_of(values, request_.segments))
+      pushed.entries.push_back(std::move(entry));
   };
   if (from && newest.stamp && *from < *newest.stamp && most >= 2) {
     Query query;
@@ -283,6 +288,7 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   SeenSegments seen = begun_;
   if (before) seen = {told_, before->stamp.value_or(Time::min()), false};
   seen.newest_only = seen.newest_only || newest_only;
+  seen.said = said_;
   const std::size_t most = kMaxItems / request_.segments.size();
   auto all = forest.segments_since(request_.segments, seen, most);
   // Of another history, the watchers have nothing.
@@ -294,6 +300,7 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
   if (!all) return pushed;
   const SegmentValues& newest = all->back();
   pushed.commit = newest.commit;
+  said_ = newest.said;
   std::vector<bool> begun(sent_.size(), false);
   const auto push = [&](PushedValue&& entry) {
     if (begins(entry) && !begun[entry.index]) entry.process_noise = Covariance();
@@ -301,11 +308,11 @@ PushedValues WatchedGroup::next_composed_push(const Forest& forest) {
     pushed.entries.push_back(std::move(entry));
   };
   for (auto earlier = all->begin(); earlier + 1 != all->end(); ++earlier) {
-    for (PushedValue& entry : entries_of(*earlier)) {
+    for (PushedValue& entry : entries_of(*earlier, request_.segments)) {
       if (again || !before || !begins(entry)) push(std::move(entry));
     }
   }
-  for (PushedValue& entry : entries_of(newest)) {
+  for (PushedValue& entry : entries_of(newest, request_.segments)) {
     if (!is_new(entry)) continue;
     push(PushedValue(entry));
     sent_[entry.index] = std::move(entry);

@@ -107,6 +107,7 @@ class WatchedGroup {
   SeenSegments begun_{0, Time::min(), true};
   std::vector<EdgeCursor> cursors_;               // by edge
   std::vector<std::optional<PushedValue>> sent_;  // by composed segment
+  std::optional<std::uint64_t> said_;             // SegmentValues::said of these
   CovarianceNumbers numbers_;
 };
 

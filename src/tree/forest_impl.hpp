@@ -225,6 +225,8 @@ class Forest::Impl {
                                                             const GivenValue& value,
                                                             std::int64_t stamp)
       TFDUDE_REQUIRES(mutex_);
+  [[nodiscard]] static SampleRevision told_revision(const HeldVersion& edge,
+                                                    const PushedValue& told);
   bool push_told_sample(const HeldVersion& edge, const PushedValue& told, bool replace)
       TFDUDE_REQUIRES(mutex_);
   bool push_told_sample(const HeldVersion& edge, const GivenValue& value, std::int64_t stamp,

@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include "tfdude/math/interpolate.hpp"
+
 #include "math/drift.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
@@ -33,6 +35,12 @@ std::vector<const PushedValue*> samples_from(const std::vector<PushedValue>& val
 
 }  // namespace
 
+// How it was given is in no message: as uncertain as it is told to be, with all its errors.
+SampleRevision Forest::Impl::told_revision(const HeldVersion& edge, const PushedValue& told) {
+  const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+  return {tfdude::whole(told.X, told.correlation, said), told.correlation, {}};
+}
+
 // The edge is static, until a sample follows.
 void Forest::Impl::begin_told_history(std::uint32_t slot, const PushedValue& value) {
   HeldVersion& fresh = push_held(slot, value.X);
@@ -49,7 +57,7 @@ bool Forest::Impl::push_told_sample(const HeldVersion& edge, const PushedValue& 
                                     bool replace) {
   const std::int64_t stamp = nanoseconds(*told.stamp);
   if (!is_of_sample(told)) return push_told_sample(edge, {told.X}, stamp, replace);
-  const SampleRevision revision{told.X, told.correlation};
+  const SampleRevision revision = told_revision(edge, told);
   return push_told_sample(edge, {told.X, nullptr, &revision}, stamp, replace);
 }
 

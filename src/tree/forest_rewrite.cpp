@@ -146,7 +146,7 @@ void Forest::Impl::rewrite_told(const HeldVersion& edge,
     samples.push_back({stamp, &told.X, nullptr});
     if (told.made_up) made_up = samples.size();
     if (is_of_sample(told)) {
-      samples.back().revision = &revisions.emplace_back(SampleRevision{told.X, told.correlation});
+      samples.back().revision = &revisions.emplace_back(told_revision(edge, told));
     }
   }
   if (samples.empty()) return;

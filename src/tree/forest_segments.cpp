@@ -1,11 +1,14 @@
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/interpolate.hpp"
+#include "tfdude/types/joint_spec.hpp"
 
 #include "math/finite.hpp"
 #include "tree/edge_marks.hpp"
@@ -170,6 +173,26 @@ void describe(const std::vector<Ends>& segments, SegmentValues& found) {
   found.history = newest_history(segments);
 }
 
+// As SegmentValues::said. A joint says another variance with each position.
+std::uint64_t said_of(const std::vector<Ends>& segments) {
+  static const std::string of_joints = shared_source({});
+  std::uint64_t said = 0;
+  const auto add = [&](std::uint64_t number) { said = (said ^ number) * 1099511628211U; };
+  const std::hash<std::string_view> hash;
+  for_each_held(segments, [&](const HeldVersion& edge) {
+    add(1);
+    if (edge.correlation == nullptr) return;
+    add(edge.correlation->said().unknown ? 2 : 3);
+    for (const CommonError& one : edge.correlation->said().common_errors) {
+      if (one.source.rfind(of_joints, 0) == 0) continue;
+      add(hash(one.source));
+      const auto* loading = reinterpret_cast<const char*>(one.loading.data());
+      add(hash({loading, static_cast<std::size_t>(one.loading.size()) * sizeof(double)}));
+    }
+  });
+  return said;
+}
+
 // Instants, including both; none if first > last.
 struct Span {
   std::int64_t first = std::numeric_limits<std::int64_t>::max();
@@ -204,10 +227,11 @@ void add_changed(const HeldVersion& edge, std::uint64_t since, std::int64_t unti
 
 // The stamps of samples for which these segments have other values than were known from `seen`,
 // sorted.
+// @param said  as SegmentValues::said
 std::vector<std::int64_t> changed_instants(const std::vector<Ends>& segments,
-                                           const SeenSegments& seen) {
+                                           const SeenSegments& seen, std::uint64_t said) {
   const std::int64_t until = nanoseconds(seen.until);
-  Span changed;
+  Span changed = seen.said && *seen.said != said ? kAllInstants : Span();
   for_each_held(segments, [&](const HeldVersion& edge) {
     if (edge.moving()) {
       add_changed(edge, seen.commit, until, changed);
@@ -398,9 +422,10 @@ Result<std::vector<SegmentValues>> Forest::segments_since(const std::vector<Path
     return tl::unexpected(explained(std::move(newest.error()), *ends, {}, impl_->now_));
   }
   describe(*ends, *newest);
+  newest->said = said_of(*ends);
   std::vector<SegmentValues> all;
   if (newest->stamp) {
-    const auto instants = changed_instants(*ends, seen);
+    const auto instants = changed_instants(*ends, seen, newest->said);
     const auto end =
         std::lower_bound(instants.begin(), instants.end(), nanoseconds(*newest->stamp));
     const auto count = std::min(static_cast<std::size_t>(end - instants.begin()), most);

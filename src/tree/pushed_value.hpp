@@ -28,7 +28,7 @@ struct PushedValue {
   std::optional<Time> stamp;
   Transform X;
   /// Of the edge, only with the last of its values of which this holds; or that of a sample, if an
-  /// observation has corrected it (is_of_sample()).
+  /// observation has corrected it, or it is one of a composed segment (is_of_sample()).
   Correlation correlation{};
   /// The number of the history of this value. A new history, with a higher number, starts when an
   /// edge is moved, added again, or loses its samples.
@@ -73,7 +73,8 @@ void join_histories(std::vector<PushedValue>& values);
 }
 
 /// Whether a value has the correlation of this sample alone. The edges that it was observed with,
-/// if only itself, tell that from what is said of its edge; of a segment, the sources do.
+/// if only itself, tell that from what is said of its edge; of a segment, earlier versions told it
+/// by the sources.
 [[nodiscard]] inline bool is_of_sample(const PushedValue& value) {
   const auto& errors = value.correlation.common_errors;
   return value.stamp && (!value.correlation.observed_with.empty() ||

@@ -73,6 +73,9 @@ struct SegmentValues : ValuesAtInstant {
   std::uint64_t commit = 0;       ///< the commit of the values; see revise()
   std::uint64_t history = 0;      ///< the newest history of their edges; see PushedValue
   std::uint64_t incarnation = 0;  ///< of the owner that counts the commits; see Partition
+  /// Identifies what is said of the errors of their edges, besides those of joints. Only of
+  /// segments_since().
+  std::uint64_t said = 0;
   /// There are no values: the history of an edge was cleared. Only of segments_since().
   bool cleared = false;
   /// They are those of no instant: an edge had no sample yet. Only of segments_since().
@@ -86,6 +89,8 @@ struct SeenSegments {
   std::uint64_t commit = 0;
   Time until{};
   bool newest_only = false;  ///< of the later instants
+  /// SegmentValues::said then, which is said of all samples of an edge; none: it is not compared.
+  std::optional<std::uint64_t> said{};
 };
 
 /// Information about one frame, without its value.

@@ -136,8 +136,8 @@ struct WatchOptions {
   /// Maximum rate at which an owner sends changes [Hz]: from once an hour to 1e6; 0: every sample.
   double rate = 0;
   /// Send one composed transform for each partition on the path instead of all its edges: fewer
-  /// bytes, but the segment is interpolated as a whole between samples. kInvalidInput if it has
-  /// process noise.
+  /// bytes, but the segment is interpolated as a whole between samples, where its covariance is a
+  /// bound. kInvalidInput if it has process noise.
   bool composed = false;
   /// How much history is kept here. A path that is read in the memory of its owners has theirs, so
   /// one for which more than the default is asked is not read there. Process noise is taken from
