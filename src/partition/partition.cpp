@@ -156,6 +156,15 @@ Reply Partition::answer_new(const PeerId& peer, const Request& request, Time now
 Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& lookup) const {
   Reply reply;
   reply.sequence = sequence;
+  const auto too_many = [&] {
+    return Error{Errc::kInvalidInput, "partition " + quote(name_) + " has more than " +
+                                          std::to_string(kMaxCorrelated) +
+                                          " segments of the path, or sources in one of them"};
+  };
+  if (lookup.edges && lookup.segments.size() > kMaxCorrelated) {
+    reply.body = too_many();
+    return reply;
+  }
   auto values = forest_.lookup_segments(lookup.segments, lookup.query, lookup.hint, lookup.edges,
                                         lookup.rows);
   if (values && lookup.timed && lookup.query.at) {
@@ -163,9 +172,7 @@ Reply Partition::answer_lookup(std::uint32_t sequence, const LookupRequest& look
     if (!timed) values = tl::unexpected(std::move(timed.error()));
   }
   if (values && are_too_many(values->correlations)) {
-    reply.body = Error{Errc::kInvalidInput, "partition " + quote(name_) + " has more than " +
-                                                std::to_string(kMaxCorrelated) +
-                                                " segments of the path, or sources in one of them"};
+    reply.body = too_many();
   } else if (values) {
     values->incarnation = pages_.incarnation();
     reply.body = *std::move(values);

@@ -2,7 +2,6 @@
 #include <functional>
 #include <limits>
 #include <string_view>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -47,18 +46,27 @@ Result<void> check_edges(const std::vector<Ends>& segments) {
                                   " edges");
 }
 
-// What is told of the rows of an edge that drifts may take a walk over its samples.
-Result<void> check_once(std::vector<PathEnds> segments) {
-  const auto by_names = [](const PathEnds& a, const PathEnds& b) {
-    return std::tie(a.from, a.to) < std::tie(b.from, b.to);
-  };
-  std::sort(segments.begin(), segments.end(), by_names);
-  const auto twice =
-      std::adjacent_find(segments.begin(), segments.end(),
-                         [&](const PathEnds& a, const PathEnds& b) { return !by_names(a, b); });
-  if (twice == segments.end()) return {};
-  return fail(Errc::kInvalidInput, "the segment from " + quote(twice->from) + " to " +
-                                       quote(twice->to) + " is asked for twice");
+// Each segment is to be one edge. To tell the rows of one that drifts may take a walk over its
+// samples, so that is done once.
+Result<void> check_single_edges(const std::vector<Ends>& segments, Rows rows) {
+  std::vector<const Version*> children;
+  for (const Ends& ends : segments) {
+    const auto is_below = [&](const Version* child, const Version* parent) {
+      return child->above != nullptr && Frames::at(*child->above, ends.commit) == parent;
+    };
+    const bool down = is_below(ends.b, ends.a);
+    if (!down && !is_below(ends.a, ends.b)) {
+      return fail(Errc::kNotOwner, "there is no edge between " + quote(ends.a->name->text) +
+                                       " and " + quote(ends.b->name->text));
+    }
+    children.push_back(down ? ends.b : ends.a);
+  }
+  if (rows != Rows::kOfPath) return {};
+  std::sort(children.begin(), children.end(), std::less<>());
+  const auto twice = std::adjacent_find(children.begin(), children.end());
+  if (twice == children.end()) return {};
+  return fail(Errc::kInvalidInput,
+              "the edge of frame " + quote((*twice)->name->text) + " is asked for twice");
 }
 
 Result<std::vector<Ends>> all_ends(const Frames& frames, const std::vector<PathEnds>& segments) {
@@ -363,11 +371,14 @@ bool all_finite(const ValuesAtInstant& found) {
 Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segments,
                                               const Query& query, std::optional<Time> hint,
                                               bool edges, Rows rows) const {
-  if (rows == Rows::kOfPath) {
-    if (auto ok = check_once(segments); !ok) return tl::unexpected(std::move(ok.error()));
-  }
   const epoch::Guard guard;
-  const auto find = [&] { return all_ends(impl_->frames_, segments); };
+  const auto find = [&]() -> Result<std::vector<Ends>> {
+    auto ends = all_ends(impl_->frames_, segments);
+    if (!ends || !edges) return ends;
+    auto single = check_single_edges(*ends, rows);
+    if (!single) return tl::unexpected(std::move(single.error()));
+    return ends;
+  };
   const auto answer = [&](const std::vector<Ends>& ends) {
     Result<SegmentValues> found = asked_segments(Own{passing(edges)}, ends, query, hint);
     if (!found) {

@@ -299,9 +299,20 @@ TEST_CASE(
   const auto refused = forest.lookup_segments(twice, {}, std::nullopt, true, Rows::kOfPath);
   REQUIRE_FALSE(refused);
   CHECK(refused.error().code == Errc::kInvalidInput);
-  CHECK(refused.error().message == "the segment from 'world' to 'a' is asked for twice");
+  CHECK(refused.error().message == "the edge of frame 'a' is asked for twice");
   CHECK(forest.lookup_segments(twice, {}, std::nullopt, true));
   CHECK(forest.lookup_segments({{"world", "a"}}, {}, std::nullopt, true, Rows::kOfPath));
+  // Nor is it told once for each other end that a segment may have.
+  REQUIRE(forest.add("b", "a", {}));
+  REQUIRE(forest.add("c", "world", {}));
+  for (const PathEnds& longer : std::vector<PathEnds>{{"world", "b"}, {"c", "b"}, {"b", "b"}}) {
+    INFO("from " << longer.from);
+    const auto none = forest.lookup_segments({{"a", "b"}, longer}, {}, std::nullopt, true);
+    REQUIRE_FALSE(none);
+    CHECK(none.error().code == Errc::kNotOwner);
+    CHECK(none.error().message ==
+          "there is no edge between '" + longer.from + "' and '" + longer.to + "'");
+  }
 }
 
 TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with its stamp") {
