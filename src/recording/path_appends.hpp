@@ -12,7 +12,7 @@ namespace tfdude::recording {
 
 /// Tells which messages only append samples to edges of a path, or do not concern it. Whether such
 /// messages are applied before or after a lookup at an instant makes no difference to its answer,
-/// once there is one.
+/// once there is one that is not extrapolated.
 class PathAppends {
  public:
   PathAppends(std::string_view a, std::string_view b) : a_(a), b_(b) {}

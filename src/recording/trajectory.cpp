@@ -23,6 +23,7 @@ class Reading::Instants {
         instants_(instants),
         query_(query),
         wait_(wait),
+        at_once_(query.extrapolate > std::chrono::nanoseconds(0) ? 0 : kAtOnce),
         order_(instants.size()),
         appends_(a, b),
         answers_(instants.size()) {
@@ -72,7 +73,7 @@ class Reading::Instants {
   void pass(const RecordedMessage& message) {
     const Time log = message.log;
     const bool appends = appends_.only_appends(*reading_.state_, message);
-    const bool answers = !appends || ++passed_ > kAtOnce || is_late(log, place(), wait_);
+    const bool answers = !appends || ++passed_ > at_once_ || is_late(log, place(), wait_);
     // The answer may have read another place.
     if (answers && !answer(log, &message)) return begin();
     if (answers) passed_ = 0;
@@ -132,6 +133,7 @@ class Reading::Instants {
   const std::vector<Time>& instants_;
   Query query_;
   const Milliseconds wait_;
+  const std::size_t at_once_;       // none if an answer may come before the samples around it
   std::vector<std::size_t> order_;  // of the instants
   std::size_t done_ = 0;            // of those in this order
   PathAppends appends_;

@@ -345,3 +345,26 @@ TEST_CASE("recording: what follows an instant is told as a watch tells it") {
   CHECK(samples == 50);
   CHECK(lost);
 }
+
+TEST_CASE("recording: a trajectory is extrapolated from what was known, as each of its lookups") {
+  const File file;
+  {
+    auto writer = RecordingWriter::create(file.path(), at(1));
+    REQUIRE(writer);
+    record(*writer, 3);
+    REQUIRE(writer->finish(at(3)));
+  }
+  auto recording = Recording::open(file.path());
+  REQUIRE(recording);
+  Query query;
+  query.extrapolate = std::chrono::milliseconds(20);
+  const std::vector<Time> instants{at(1.1049), at(1.5), at(2.0051), at(2.9951), at(3.01)};
+  const Trajectory all = recording->trajectory("base", "hand", instants, query);
+  for (std::size_t i = 0; i < instants.size(); ++i) {
+    INFO("at " << nanoseconds(instants[i]) << " ns");
+    const auto one = recording->lookup_at("base", "hand", instants[i], query);
+    REQUIRE(one);
+    REQUIRE(all.X_AB[i]);
+    CHECK(all.X_AB[i]->covariance == one->covariance);
+  }
+}
