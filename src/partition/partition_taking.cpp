@@ -93,9 +93,10 @@ Result<void> Partition::adopt(const PeerId& peer, const std::string& top,
   directory_.saw_lamport_time(request.lamport_time);
   const auto has = handovers_.adopted.find(top);
   const auto& given = request.part.edges;
-  const bool again = has != handovers_.adopted.end() && !given.empty() &&
+  const auto there = forest_.info(top);  // it may be gone, and not be settled yet
+  const bool again = has != handovers_.adopted.end() && there && !given.empty() &&
                      has->second.offered == given.front().lamport_time &&
-                     forest_.info(top)->parent == request.parent.value_or(given.front().parent);
+                     there->parent == request.parent.value_or(given.front().parent);
   if (again) return {};
   if (auto ok = check_offered(given, top, request); !ok) return ok;
   auto whole = adopted_parts_.add(peer, top, request.part, now);
