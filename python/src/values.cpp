@@ -110,8 +110,10 @@ void bind_structure(py::module_& module) {
       .def_readonly("in_memory", &PartitionInfo::in_memory, "Whether lookups read its memory.")
       .def_readonly("why_not_in_memory", &PartitionInfo::why_not_in_memory,
                     "Why they ask it over DDS; empty: they do not.")
-      .def_readonly("complete", &PartitionInfo::complete,
-                    "If reachable: all frames that it has announced have come here.");
+      .def_readonly(
+          "complete", &PartitionInfo::complete,
+          "All frames that it has announced have come here. If it is not reachable, it was\n"
+          "lost after that.");
   py::class_<Change>(module, "Change", "A change of the structure.")
       .def_property_readonly(
           "kind", [](const Change& change) { return std::string(to_string(change.kind)); },
