@@ -13,10 +13,11 @@
 namespace tfdude {
 namespace {
 
-// What was read in memory names no process, and counts for itself.
+// What was read in memory names no process, but its commits are those that the process counts.
 bool is_before(const SegmentValues& earlier, const SegmentValues& later) {
-  const bool of_both = (earlier.incarnation == 0) != (later.incarnation == 0);
-  return of_both || (earlier.incarnation == later.incarnation && earlier.commit <= later.commit);
+  const bool is_known = earlier.incarnation != 0 && later.incarnation != 0;
+  if (is_known && earlier.incarnation != later.incarnation) return false;
+  return earlier.commit == 0 || later.commit == 0 || earlier.commit <= later.commit;
 }
 
 bool says_the_same(const SegmentValues& one, const SegmentValues& other) {
