@@ -111,6 +111,15 @@ py::dict sources_of(const FrameSpec& frame) {
   return sources;
 }
 
+// A Node is not told the file's history.
+std::vector<FrameSpec> frames_of(const Config& config) {
+  std::vector<FrameSpec> frames = config.frames;
+  for (FrameSpec& frame : frames) {
+    if (!frame.timing && !frame.parent.empty() && config.has_history) frame.timing = config.history;
+  }
+  return frames;
+}
+
 }  // namespace
 
 void bind_frames(py::module_& module) {
@@ -151,7 +160,7 @@ void bind_frames(py::module_& module) {
           "Its own error may be correlated with any other.");
   py::class_<Config>(module, "Config", "The content of a daemon's YAML file.")
       .def_readonly("partition", &Config::partition, "Empty if the file names none.")
-      .def_readonly("frames", &Config::frames);
+      .def_property_readonly("frames", &frames_of, "With the file's history, or their own.");
   module.def(
       "load_config", [](const std::string& path) { return value_of(load_config(path)); },
       py::arg("path"), "Reads a daemon's YAML file, and the URDF files that it names.");

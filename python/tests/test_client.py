@@ -259,3 +259,17 @@ def test_edges_that_share_a_source_are_correlated(client, node):
     assert client.lookup("upper", "lower").sources == []
     with pytest.raises(ValueError):
         client.correlate("lower", {"heat": np.ones(5)})
+
+
+def test_frames_of_a_file_have_its_history(tmp_path, network):
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        "partition: robot\nhistory: {span: 100, max_ahead: none}\nframes:\n"
+        "  - {id: base}\n  - {id: arm, parent: base}\n"
+        "  - {id: tool, parent: arm, history: {span: 5}}\n"
+    )
+    frames = tfdude.load_config(str(file)).frames
+    with tfdude.Node("robot", frames, network=network) as node:
+        for second in range(0, 50, 10):
+            node.update_many(["arm", "tool"], [tfdude.Transform.exact()] * 2, 10**9 * second)
+        assert [node.history(frame)[0].samples for frame in ("arm", "tool")] == [5, 2]

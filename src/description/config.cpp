@@ -256,6 +256,7 @@ Result<Config> ConfigReader::config(const YAML::Node& root) const {
     auto timing = history(found->second, "the file", config.history);
     if (!timing) return tl::unexpected(timing.error());
     config.history = *timing;
+    config.has_history = true;
   }
   if (const auto found = entries->find("frames"); found != entries->end()) {
     if (auto ok = frames(found->second, config); !ok) return tl::unexpected(ok.error());

@@ -36,8 +36,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How many readers an owner admits, and how long it waits for what one says first.
+// How many readers an owner admits, how many it hears at once, as any user of the computer may call,
+// and how long it waits for what one says first.
 constexpr std::size_t kMostReaders = 1024;
+constexpr std::ptrdiff_t kMostHeard = 32;
 constexpr std::chrono::milliseconds kPatience{1000};
 // How long it admits nobody if it cannot.
 constexpr std::chrono::milliseconds kRest{100};
@@ -140,6 +142,11 @@ class LinuxMemory final : public SharedMemory {
     if (wake_.valid()) (void)!write(wake_.get(), &one, sizeof(one));
   }
   void run();
+  /// The number of readers that have not said yet what they want.
+  [[nodiscard]] std::ptrdiff_t heard_now() const {
+    return std::count_if(readers_.begin(), readers_.end(),
+                         [](const Reader& reader) { return !reader.admitted; });
+  }
   void admit();
   void listen_to_readers(const std::vector<pollfd>& polled, std::size_t first);
   void end(std::uint64_t number);
@@ -282,11 +289,12 @@ void LinuxMemory::run() {
   std::vector<std::uint64_t> numbers;
   while (true) {
     const bool rests = Clock::now() < admits_from_;
+    const std::ptrdiff_t heard = heard_now();
     polled.assign(1, {wake_.get(), POLLIN, 0});
     {
       const Lock lock(mutex_);
       if (stopping_) return;
-      polled.push_back({rests ? -1 : listening_.get(), POLLIN, 0});
+      polled.push_back({rests || heard >= kMostHeard ? -1 : listening_.get(), POLLIN, 0});
     }
     for (const Reader& reader : readers_) polled.push_back({reader.socket.get(), POLLIN, 0});
     const std::size_t first_owner = polled.size();
@@ -298,10 +306,8 @@ void LinuxMemory::run() {
         polled.push_back({owner.socket.get(), POLLIN, 0});
       }
     }
-    const bool expected = std::any_of(readers_.begin(), readers_.end(),
-                                      [](const Reader& reader) { return !reader.admitted; });
     const auto most = (rests ? kRest : kPatience).count();
-    const int wait = expected || rests ? static_cast<int>(most) : -1;
+    const int wait = heard > 0 || rests ? static_cast<int>(most) : -1;
     (void)poll(polled.data(), static_cast<nfds_t>(polled.size()), wait);
     std::uint64_t woken = 0;
     if (polled[0].revents != 0) (void)!read(wake_.get(), &woken, sizeof(woken));
@@ -329,7 +335,7 @@ void LinuxMemory::end(std::uint64_t number) {
 }
 
 void LinuxMemory::admit() {
-  while (true) {
+  for (std::ptrdiff_t heard = heard_now(); heard < kMostHeard; ++heard) {
     const Lock lock(mutex_);
     Descriptor called = accept_one(listening_);
     if (!called.valid()) {

@@ -16,6 +16,7 @@ struct Config {
   std::string partition;           ///< empty if the file names none
   std::optional<ClockKind> clock;  ///< absent if the file names none
   EdgeTiming history;              ///< default for frames without their own
+  bool has_history = false;        ///< the file says it
   /// Of edges for which the file gives none: unspecified, or exact.
   StatedCovariance covariance{};
   std::vector<FrameSpec> frames;

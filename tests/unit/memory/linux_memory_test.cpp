@@ -2,15 +2,19 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <future>
+#include <iterator>
 #include <string>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <vector>
 
 #include "memory/port.hpp"
+#include "memory/unix_socket.hpp"
 #include "memory/waiting.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
@@ -20,6 +24,7 @@
 namespace tfdude {
 namespace {
 
+using testing::eventually;
 using testing::outcome;
 
 constexpr std::size_t kSize = std::size_t{1} << 20U;
@@ -192,6 +197,29 @@ TEST_CASE("the end of what is released is not told, and an owner admits others a
   for (int i = 0; i < 2000; ++i) {
     REQUIRE(reader->attach(owner.offer, kLayout, [](bool) { FAIL("told"); }));
   }
+}
+
+TEST_CASE("callers that say nothing take few descriptors of an owner, and others come after them") {
+  const auto descriptors = [] {
+    const std::filesystem::directory_iterator all("/proc/self/fd");
+    return std::distance(begin(all), end(all));
+  };
+  Offering owner;
+  const auto before = descriptors();
+  constexpr int kSilent = 100;
+  std::vector<Descriptor> silent;
+  for (int i = 0; i < kSilent; ++i) {
+    auto socket = connect_to(owner.offer.socket);
+    if (socket) silent.push_back(*std::move(socket));
+  }
+  REQUIRE(silent.size() > 50);
+  const auto own = static_cast<std::ptrdiff_t>(silent.size());
+  // It hears the first ones, and would have taken all by then.
+  REQUIRE(eventually([&] { return descriptors() > before + own + 16; }));
+  CHECK(descriptors() <= before + own + 40);
+  // Each gets a second.
+  const auto reader = make_linux_memory();
+  CHECK(eventually([&] { return reader->attach(owner.offer, kLayout, ignore_end).has_value(); }));
 }
 
 TEST_CASE("a limit of this process that does not allow it is a reason, and no signal") {
