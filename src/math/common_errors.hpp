@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "tfdude/math/belief.hpp"
@@ -31,6 +32,13 @@ inline void widen(Loading& loading, Eigen::Index columns) {
 
 /// Adds errors, source by source and column by column.
 void add_errors(const std::vector<CommonError>& more, std::vector<CommonError>& sum);
+
+/// Adds up those that have got the same name.
+inline void add_up(std::vector<CommonError>& errors) {
+  std::vector<CommonError> sum;
+  add_errors(errors, sum);
+  errors = std::move(sum);
+}
 
 /// The errors of a value that is this multiple of another one.
 [[nodiscard]] inline std::vector<CommonError> times(const Matrix6d& factor,

@@ -78,7 +78,7 @@ void give(const JointCovariance& joint, std::vector<CorrectedError>& edges,
 class InstantErrors {
  public:
   void append(const JointPrior::Source& source, const std::vector<Loading>& loadings) {
-    if (is_of_one_instant(source.name)) {
+    if (!instant_in(source.name).empty()) {
       kept_.push_back({source.name, false, loadings});
       return;
     }

@@ -73,6 +73,18 @@ bool is_of(std::string_view name, std::string_view said) {
   return said_source(name) == said || is_source_itself(name, said);
 }
 
+// Gives those between samples the name of their source. @return whether there were any
+bool join_samples(const std::string& source, std::vector<CommonError>& errors) {
+  bool any = false;
+  for (CommonError& one : errors) {
+    if (!is_between_samples(one.source)) continue;
+    if (!is_source_itself(source, said_source(one.source))) continue;
+    one.source = source;
+    any = true;
+  }
+  return any;
+}
+
 }  // namespace
 
 std::string instant_source(std::string_view source, Time stamp) {
@@ -85,8 +97,35 @@ std::string source_between(std::string_view source, Time before, Time after) {
          std::to_string(nanoseconds(after)) + kOf + shortened(source);
 }
 
+std::string stored_between(std::string_view source_between, Time at) {
+  std::string name(source_between);
+  name.insert(name.find(kOf), kAt + std::to_string(nanoseconds(at)));
+  return name;
+}
+
+void store_between(Time at, std::vector<CommonError>& common_errors) {
+  for (CommonError& one : common_errors) {
+    if (is_of_two_samples(one.source)) one.source = stored_between(one.source, at);
+  }
+}
+
 bool is_between_samples(std::string_view name) {
   return !said_source(name).empty() && name[kObservedPrefix.size()] == kBetween;
+}
+
+bool is_of_two_samples(std::string_view name) {
+  return is_between_samples(name) && instant_in(name).empty();
+}
+
+std::string_view shown_source(std::string_view name) {
+  return is_between_samples(name) ? said_source(name) : name;
+}
+
+std::string_view instant_in(std::string_view name) {
+  if (!is_of_one_instant(name) && !is_between_samples(name)) return {};
+  const std::string_view begin = name.substr(0, name.find(kOf));
+  const std::size_t at = begin.find(kAt);
+  return at == std::string_view::npos ? std::string_view() : begin.substr(at + 1);
 }
 
 std::string merged_source(std::string_view observation, std::string_view source) {
@@ -131,16 +170,33 @@ bool join_instant(std::vector<CommonError>& common_errors, Time stamp) {
     one.source = source->source;
     any = true;
   }
-  if (!any) return false;
-  std::vector<CommonError> joined;
-  add_errors(common_errors, joined);
-  common_errors = std::move(joined);
-  return true;
+  if (any) add_up(common_errors);
+  return any;
 }
 
-bool allow_any_relation(std::vector<CommonError>& common_errors) {
+void join_lasting(const std::vector<ErrorsOfEdge>& edges) {
+  const bool between = std::any_of(edges.begin(), edges.end(), [](const ErrorsOfEdge& edge) {
+    return std::any_of(edge.errors->begin(), edge.errors->end(),
+                       [](const CommonError& one) { return is_between_samples(one.source); });
+  });
+  if (!between) return;
+  std::vector<std::string> lasting;
+  for (const ErrorsOfEdge& edge : edges) {
+    if (!edge.lasts) continue;
+    for (const CommonError& one : *edge.errors) {
+      if (said_source(one.source).empty()) lasting.push_back(one.source);
+    }
+  }
+  for (const ErrorsOfEdge& edge : edges) {
+    bool any = false;
+    for (const std::string& source : lasting) any = join_samples(source, *edge.errors) || any;
+    if (any) add_up(*edge.errors);
+  }
+}
+
+std::vector<double> relation_weights(const std::vector<CommonError>& common_errors) {
+  std::vector<double> weights;
   std::vector<std::string_view> done;
-  bool any = false;
   for (const CommonError& first : common_errors) {
     const std::string_view said = said_source(first.source);
     if (said.empty() || std::count(done.begin(), done.end(), said) > 0) continue;
@@ -151,12 +207,21 @@ bool allow_any_relation(std::vector<CommonError>& common_errors) {
       sides.add(one.source, Covariance::trusted(Matrix6d(one.loading * one.loading.transpose())));
     }
     if (!sides.weigh()) continue;
-    for (CommonError& one : common_errors) {
-      if (is_of(one.source, said)) one.loading *= std::sqrt(sides.weight(one.source));
+    weights.resize(common_errors.size(), 1.0);
+    for (std::size_t i = 0; i < common_errors.size(); ++i) {
+      const std::string& name = common_errors[i].source;
+      if (is_of(name, said)) weights[i] = sides.weight(name);
     }
-    any = true;
   }
-  return any;
+  return weights;
+}
+
+bool allow_any_relation(std::vector<CommonError>& common_errors) {
+  const std::vector<double> weights = relation_weights(common_errors);
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    common_errors[i].loading *= std::sqrt(weights[i]);
+  }
+  return !weights.empty();
 }
 
 Covariance sum_of_sources(const std::vector<OfSource>& parts, bool& bounded) {

@@ -28,8 +28,24 @@ namespace tfdude {
 /// The name of a source's error in what is interpolated, or extrapolated, from these two samples.
 [[nodiscard]] std::string source_between(std::string_view source, Time before, Time after);
 
-/// Whether it is such a name.
+/// The name for what a new sample of this instant has of that error, once it is stored.
+[[nodiscard]] std::string stored_between(std::string_view source_between, Time at);
+
+/// Gives errors that names.
+void store_between(Time at, std::vector<CommonError>& common_errors);
+
+/// Whether it is a name of these two kinds.
 [[nodiscard]] bool is_between_samples(std::string_view name);
+
+/// Whether it is one of those that are not stored: the values of an edge tell it, and no
+/// observation has left it.
+[[nodiscard]] bool is_of_two_samples(std::string_view name);
+
+/// What a user calls the source: as it was said, if the error comes from two samples.
+[[nodiscard]] std::string_view shown_source(std::string_view name);
+
+/// The instant of such a stored error, or of one instant, as a text; empty: the name has none.
+[[nodiscard]] std::string_view instant_in(std::string_view name);
 
 /// The source of whose error at some instants this is; empty: of none. Long names are
 /// shortened.
@@ -46,6 +62,19 @@ namespace tfdude {
 
 /// At an instant, its error of a source is the source's. @return whether there was one
 bool join_instant(std::vector<CommonError>& common_errors, Time stamp);
+
+/// The common errors of an edge, or of some.
+struct ErrorsOfEdge {
+  std::vector<CommonError>* errors;  ///< not null
+  bool lasts;                        ///< it is static, or drifts
+};
+
+/// Gives the errors between samples the names of their sources again that an edge names which
+/// lasts: such a source has one error for all time.
+void join_lasting(const std::vector<ErrorsOfEdge>& edges);
+
+/// By what the square of each error counts in allow_any_relation(); empty: each of them once.
+[[nodiscard]] std::vector<double> relation_weights(const std::vector<CommonError>& common_errors);
 
 /// Makes errors of a source, of the same source at some instants, and of each two samples, as large
 /// as suffices for any correlation of these. @return whether there were any

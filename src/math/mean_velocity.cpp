@@ -79,7 +79,9 @@ class Sum {
         parts.emplace_back(source.name, bound(squared(source.before), squared(source.after)));
         bound_ = true;
       }
-      velocity.sources.push_back(source.name);
+      const std::string shown(shown_source(source.name));
+      const auto& all = velocity.sources;
+      if (std::count(all.begin(), all.end(), shown) == 0) velocity.sources.push_back(shown);
     }
     total_ += sum_of_sources(parts, bound_);
     velocity.covariance = unknown_ ? bound(total_, *unknown_) : total_;
@@ -133,9 +135,22 @@ Matrix6d carried(const Pose& along_edge, Way way, const Pose& beyond) {
   return -adjoint((along_edge * beyond).inverse());
 }
 
+// A source that an edge makes last is one error at both ends.
+void join_lasting_sources(std::vector<EdgeAtEnds>& path) {
+  std::vector<ErrorsOfEdge> all;
+  for (EdgeAtEnds& edge : path) {
+    const bool lasts = edge.fixed || edge.drifts;
+    all.push_back({&edge.before.common_errors, lasts});
+    all.push_back({&edge.after.common_errors, lasts});
+  }
+  join_lasting(all);
+}
+
 }  // namespace
 
-MeanVelocity mean_velocity(const std::vector<EdgeAtEnds>& path, double seconds) {
+MeanVelocity mean_velocity(const std::vector<EdgeAtEnds>& edges, double seconds) {
+  std::vector<EdgeAtEnds> path = edges;
+  join_lasting_sources(path);
   Pose X0;
   Pose X1;
   for (const EdgeAtEnds& edge : path) {

@@ -34,7 +34,8 @@ struct MeanVelocity {
 /// Those are sums over the edges, G1 e1 - G0 e0 with an edge's errors e0, e1. If the edge is fixed,
 /// e1 = e0; if it drifts, e1 follows from e0 (drift_between()). Otherwise their correlation is not
 /// known: an offset is common to both, noise is not. So its share is bound(G0 Σ0 G0ᵀ, G1 Σ1 G1ᵀ).
-/// Sources are treated likewise, after the loadings of all edges have been added up. Parts that
+/// Sources are treated likewise, after the loadings of all edges have been added up; those of
+/// different samples of an edge may be related in any way (instant_sources.hpp). Parts that
 /// observations subtract are left out, which makes the covariance larger.
 /// @param seconds  Δt, positive
 [[nodiscard]] MeanVelocity mean_velocity(const std::vector<EdgeAtEnds>& path, double seconds);

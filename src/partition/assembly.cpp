@@ -23,30 +23,19 @@ void each_segment(const LookupPlan& plan, Take take) {
   }
 }
 
-// A source that lasts has one error, also between samples.
-void join_samples(const std::string& source, std::vector<CommonError>& errors) {
-  bool any = false;
-  for (CommonError& one : errors) {
-    if (!is_between_samples(one.source)) continue;
-    if (!is_source_itself(source, said_source(one.source))) continue;
-    one.source = source;
-    any = true;
-  }
-  if (!any) return;
-  std::vector<CommonError> joined;
-  add_errors(errors, joined);
-  errors = std::move(joined);
-}
-
 // What an answer names that has no instant is of static edges: it lasts.
 void join_lasting(const std::vector<SegmentValues>& answers, std::vector<CommonError>& errors) {
   if (!has_instants(errors)) return;
+  std::vector<std::vector<CommonError>> others;
   for (const SegmentValues& answer : answers) {
     if (answer.stamp) continue;
     for (const PathCorrelation& correlation : answer.correlations) {
-      for (const CommonError& one : correlation.common_errors) join_samples(one.source, errors);
+      others.push_back(correlation.common_errors);
     }
   }
+  std::vector<ErrorsOfEdge> all = {{&errors, false}};
+  for (auto& one : others) all.push_back({&one, true});
+  tfdude::join_lasting(all);
 }
 
 StampedTransform composed(const LookupPlan& plan, const std::vector<SegmentValues>& answers) {

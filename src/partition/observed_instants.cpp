@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "tfdude/types/joint_spec.hpp"
@@ -76,18 +78,6 @@ ObservedInstants::ObservedInstants(const ObservePlan& plan, const ObservedPath& 
                                    std::string source)
     : plan_(plan), path_(path), source_(std::move(source)) {}
 
-// Absent: the edge is static, or drifts.
-std::optional<Time> ObservedInstants::instant_of(std::size_t k) const {
-  const ObservedPath::Row& row = path_.rows[k];
-  const ObservePlan::Edge& edge = plan_.edges[row.edge];
-  const PathCorrelation& correlation = path_.correlations[row.edge];
-  if (!is_moving(edge.info.id, correlation) || is_drifting(edge.info.id, correlation)) {
-    return std::nullopt;
-  }
-  if (row.stamp) return row.stamp;
-  return edge.way == ObservedEdge::Way::kBeside ? path_.seen[edge.part].stamp : path_.stamp;
-}
-
 // One beside the path does only if it was observed.
 bool ObservedInstants::takes_part(const ObservedEdge& edge) const {
   const auto& errors = edge.X_PC.common_errors;
@@ -100,9 +90,9 @@ std::vector<ObservedInstants::Use> ObservedInstants::uses(
   std::vector<Use> all;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!takes_part(edges[k])) continue;
-    const bool lasts = !instant_of(k);
+    const bool lasts = !instant_of(plan_, path_, k);
     for (const CommonError& one : edges[k].X_PC.common_errors) {
-      if (is_observed(one)) continue;
+      if (one.source.rfind(kObservedPrefix, 0) == 0) continue;
       auto use = std::find_if(all.begin(), all.end(),
                               [&](const Use& other) { return other.source == one.source; });
       if (use == all.end()) use = all.insert(use, {one.source});
@@ -115,7 +105,7 @@ std::vector<ObservedInstants::Use> ObservedInstants::uses(
 void ObservedInstants::rename(std::vector<ObservedEdge>& edges, const Use& use) {
   for (std::size_t k = 0; k < edges.size(); ++k) {
     if (!takes_part(edges[k])) continue;
-    const auto at = instant_of(k);
+    const auto at = instant_of(plan_, path_, k);
     for (CommonError& one : edges[k].X_PC.common_errors) {
       if (one.source != use.source) continue;
       one.source =
@@ -125,7 +115,52 @@ void ObservedInstants::rename(std::vector<ObservedEdge>& edges, const Use& use) 
   }
 }
 
+// Those of a source that lasts have its name again; others get one that can be stored.
+void ObservedInstants::name_between(std::vector<ObservedEdge>& edges) {
+  std::vector<ErrorsOfEdge> all;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const bool lasts = takes_part(edges[k]) && !instant_of(plan_, path_, k);
+    all.push_back({&edges[k].X_PC.common_errors, lasts});
+  }
+  join_lasting(all);
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const auto at = instant_of(plan_, path_, k);
+    if (!at || !takes_part(edges[k])) continue;
+    for (CommonError& one : edges[k].X_PC.common_errors) {
+      if (!is_of_two_samples(one.source)) continue;
+      one.source = stored_between(one.source, *at);
+      renamed_.push_back({k, one.source, one.source});
+    }
+  }
+}
+
+// What is merged counts as independent: that is enough for any relation of errors at one instant.
+void ObservedInstants::merge_others(std::vector<ObservedEdge>& edges) const {
+  const std::string here = path_.stamp ? std::to_string(nanoseconds(*path_.stamp)) : std::string();
+  std::map<std::pair<std::string, std::string>, std::set<std::string>> names;  // of what is merged
+  const auto of = [](const std::string& name) {
+    return std::pair(std::string(said_source(name)), std::string(instant_in(name)));
+  };
+  const auto is_other = [&](const std::string& name) {
+    const std::string_view instant = instant_in(name);
+    return !instant.empty() && instant != here;
+  };
+  for (const ObservedEdge& edge : edges) {
+    for (const CommonError& one : edge.X_PC.common_errors) {
+      if (is_other(one.source)) names[of(one.source)].insert(one.source);
+    }
+  }
+  for (ObservedEdge& edge : edges) {
+    for (CommonError& one : edge.X_PC.common_errors) {
+      if (!is_other(one.source)) continue;
+      one.loading *= std::sqrt(static_cast<double>(names[of(one.source)].size()));
+      one.source = as_merged(one.source);
+    }
+  }
+}
+
 void ObservedInstants::name(std::vector<ObservedEdge>& edges, bool merge) {
+  name_between(edges);
   for (const Use& use : uses(edges)) {
     const bool of_joint = is_of_joint(use.source);
     if (use.lasts && of_joint && has_instants_of(edges, use.source)) count_twice(edges, use.source);
@@ -135,15 +170,10 @@ void ObservedInstants::name(std::vector<ObservedEdge>& edges, bool merge) {
       make_lasting(edges, use.source);
     }
   }
-  if (!merge) return;
-  for (ObservedEdge& edge : edges) {
-    for (CommonError& one : edge.X_PC.common_errors) {
-      if (!is_of_one_instant(one.source)) continue;
-      const std::string said(said_source(one.source));
-      const bool here = path_.stamp && one.source == instant_source(said, *path_.stamp);
-      if (!here) one.source = as_merged(one.source);
-    }
-  }
+  if (merge) merge_others(edges);
+  relations_ = PathRelations(edges);
+  relations_.keep_instants();
+  for (ObservedEdge& edge : edges) relations_.widen(edge.X_PC.common_errors);
 }
 
 // Whether another edge than those that named it has a share.
@@ -160,6 +190,7 @@ bool ObservedInstants::is_shared(const Observation& found, const std::string& na
 
 void ObservedInstants::settle(Observation& found) const {
   if (!found.accepted) return;
+  for (ObservedResult& edge : found.edges) relations_.narrow(edge.X_PC.common_errors);
   for (const Renamed& one : renamed_) {
     ObservedResult& edge = found.edges[one.edge];
     if (is_shared(found, one.now)) {

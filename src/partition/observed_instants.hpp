@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "tfdude/math/observation.hpp"
 
+#include "math/path_relations.hpp"
 #include "partition/observing.hpp"
 
 namespace tfdude {
@@ -15,6 +15,8 @@ namespace tfdude {
 /// path name (math/instant_sources.hpp):
 /// - those that only dynamic edges name which do not drift: of the instant of each;
 /// - those of joints, also if their edges are static: of the value.
+/// One that comes from two samples stays apart: to judge the measurement, any relation is allowed
+/// for; the values keep what each has of it.
 /// A source that a static edge names too, or one that drifts, is one error for all time, also at an
 /// instant before. What was left of several instants counts as independent of it. A joint's value
 /// may be the one that was observed before: any relation of both is allowed for.
@@ -39,16 +41,18 @@ class ObservedInstants {
   };
   struct Use;
 
-  [[nodiscard]] std::optional<Time> instant_of(std::size_t k) const;
   [[nodiscard]] bool takes_part(const ObservedEdge& edge) const;
   [[nodiscard]] std::vector<Use> uses(const std::vector<ObservedEdge>& edges) const;
   void rename(std::vector<ObservedEdge>& edges, const Use& use);
+  void name_between(std::vector<ObservedEdge>& edges);
+  void merge_others(std::vector<ObservedEdge>& edges) const;
   [[nodiscard]] bool is_shared(const Observation& found, const std::string& name) const;
 
   const ObservePlan& plan_;
   const ObservedPath& path_;
   const std::string source_;
   std::vector<Renamed> renamed_;
+  PathRelations relations_;
 };
 
 }  // namespace tfdude

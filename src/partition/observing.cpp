@@ -205,9 +205,11 @@ std::size_t row_of(const ObservePlan& plan, const ObservedPath& path, const Revi
   return static_cast<std::size_t>(found - path.rows.begin());
 }
 
-// What a row of the path was before.
-Revision as_it_was(const ObservedPath& path, const std::string& id, std::size_t k) {
-  const Belief& X = path.edges[k].X_PC;
+// What a row of the path was before. It may have got a sample by now.
+Revision as_it_was(const ObservePlan& plan, const ObservedPath& path, const std::string& id,
+                   std::size_t k) {
+  Belief X = path.edges[k].X_PC;
+  if (const auto at = instant_of(plan, path, k)) store_between(*at, X.common_errors);
   Revision revision{id,
                     {X.pose, stored_part(X)},
                     {X.unknown.has_value(), X.common_errors, path.correlations[k].observed_with},
@@ -305,6 +307,17 @@ Result<ObservedPath> observed_path(const ObservePlan& plan,
   return path;
 }
 
+std::optional<Time> instant_of(const ObservePlan& plan, const ObservedPath& path, std::size_t row) {
+  const auto& [k, stamp] = path.rows[row];
+  const ObservePlan::Edge& edge = plan.edges[k];
+  const PathCorrelation& correlation = path.correlations[k];
+  if (!is_moving(edge.info.id, correlation) || is_drifting(edge.info.id, correlation)) {
+    return std::nullopt;
+  }
+  if (stamp) return stamp;
+  return edge.way == Way::kBeside ? path.seen[edge.part].stamp : path.stamp;
+}
+
 void loosen(const ObservePlan& plan, std::vector<ObservedEdge>& edges) {
   constexpr double kMore = 0.01;
   const auto is_unspecified = [](const ObservedEdge& edge) {
@@ -365,7 +378,7 @@ std::vector<Part> revisions(const ObservePlan& plan, const ObservedPath& path,
     const Edge& observed = plan.edges[row.edge];
     ReviseRequest::Edge edge{observed.info.id, result.innovation, !observation.accepted, {}};
     if (keeps && !result.corrected) {
-      edge.revision = as_it_was(path, edge.id, k);
+      edge.revision = as_it_was(plan, path, edge.id, k);
     } else if (result.corrected) {
       const Belief& X = result.X_PC;
       edge.revision = Revision{
@@ -411,7 +424,7 @@ std::optional<Part> taken_back(const ObservePlan& plan, const ObservedPath& path
     Revision& revision = *edges[i].revision;
     const auto now = present_belief(present, i, revision);
     if (!now || !is_same(*now, revision)) return std::nullopt;
-    revision = as_it_was(path, revision.id, row_of(plan, path, revision));
+    revision = as_it_was(plan, path, revision.id, row_of(plan, path, revision));
     edges[i].innovation = {};
   }
   return part;

@@ -69,6 +69,10 @@ struct ObservedPath {
 [[nodiscard]] Result<ObservedPath> observed_path(const ObservePlan& plan,
                                                  const std::vector<SegmentValues>& answers);
 
+/// That of a row of the path. Absent: its edge is static, or drifts.
+[[nodiscard]] std::optional<Time> instant_of(const ObservePlan& plan, const ObservedPath& path,
+                                             std::size_t row);
+
 /// If nothing is known of an edge of the path, and another one that drifts was observed later: what
 /// it may have drifted until then counts as independent, many times, and the errors of all edges
 /// count a little more. That is enough for any correlation, and ties the edge to the others.

@@ -9,6 +9,8 @@
 #include "tfdude/base/similar.hpp"
 
 #include "calls/lookup_in_progress.hpp"
+#include "math/instant_sources.hpp"
+#include "math/path_relations.hpp"
 #include "math/variance_shares.hpp"
 #include "partition/observing.hpp"
 #include "runtime/member_runner.hpp"
@@ -38,7 +40,13 @@ class PathEdgesTask final : public Task {
     if (!answers) return tl::unexpected(std::move(answers.error()));
     auto path = observed_path(plan_, *answers);
     if (!path) return tl::unexpected(std::move(path.error()));
+    path->edges.resize(plan_.edges.size());  // no rows were asked for
+    std::vector<bool> lasting;
+    for (std::size_t k = 0; k < plan_.edges.size(); ++k) {
+      lasting.push_back(!instant_of(plan_, *path, k));
+    }
     edges_ = std::move(path->edges);
+    relate_sources(edges_, lasting, path->stamp);
     return Next::kDone;
   }
 
@@ -164,7 +172,11 @@ void Explanations::divide(const std::string& a, const std::string& b, const WhyQ
     if (!best || shares.after[k] < shares.after[*best]) best = k;
   }
   std::vector<VarianceShare> sources;
-  for (const auto& [name, variance] : shares.sources) sources.push_back({name, variance, 0});
+  std::map<std::string, double> of_shown;
+  for (const auto& [name, variance] : shares.sources) {
+    of_shown[std::string(shown_source(name))] += variance;
+  }
+  for (const auto& [name, variance] : of_shown) sources.push_back({name, variance, 0});
   explanation.edges = sorted(std::move(edges), shares.total);
   explanation.sources = sorted(std::move(sources), shares.total);
   explanation.joints = sorted(std::move(moved), shares.total);

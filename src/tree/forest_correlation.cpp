@@ -27,7 +27,7 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
   StampedTransform found{collapse(X), stamp, {order, bounded, {}}};
   std::vector<std::string>& sources = found.basis.sources;
   for (const auto& [source, subtracts, loading] : X.common_errors) {
-    sources.emplace_back(is_between_samples(source) ? said_source(source) : source);
+    sources.emplace_back(shown_source(source));
   }
   std::sort(sources.begin(), sources.end());
   sources.erase(std::unique(sources.begin(), sources.end()), sources.end());

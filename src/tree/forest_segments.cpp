@@ -92,21 +92,17 @@ struct Reached {
   [[nodiscard]] Output output() { return {X, correlation}; }
 };
 
-PathLookup::Absent passing(bool edges) {
-  return edges ? PathLookup::Absent::kBeyondEdge : PathLookup::Absent::kMayPass;
-}
-
 // As of PathLookup, and over edges that others hold.
 struct Own {
-  PathLookup::Absent absent = PathLookup::Absent::kMayPass;
+  static constexpr auto kAbsent = PathLookup::Absent::kMayPass;
 
-  Result<void> reach_newest(const Ends& ends, Order order, PathLookup::Met& met,
-                            Output output) const {
-    return PathLookup::reach_newest(ends, absent, order, met, output);
+  static Result<void> reach_newest(const Ends& ends, Order order, PathLookup::Met& met,
+                                   Output output) {
+    return PathLookup::reach_newest(ends, kAbsent, order, met, output);
   }
-  Result<void> reach_at(const Ends& ends, const PathLookup::Instant& at, const Query& query,
-                        PathLookup::Met& met, Output output) const {
-    return PathLookup::reach_at(ends, absent, at, query, met, output);
+  static Result<void> reach_at(const Ends& ends, const PathLookup::Instant& at, const Query& query,
+                               PathLookup::Met& met, Output output) {
+    return PathLookup::reach_at(ends, kAbsent, at, query, met, output);
   }
   static std::vector<std::string> unspecified(const Ends& ends, std::int64_t t) {
     return unspecified_edges(ends, t);
@@ -114,15 +110,14 @@ struct Own {
 };
 struct Others {
   RemoteReading& reading;
-  PathLookup::Absent absent;
 
   Result<void> reach_newest(const Ends& ends, Order order, PathLookup::Met& met,
                             Output output) const {
-    return tfdude::reach_newest(ends, absent, order, reading, met, output);
+    return tfdude::reach_newest(ends, Own::kAbsent, order, reading, met, output);
   }
   Result<void> reach_at(const Ends& ends, const PathLookup::Instant& at, const Query& query,
                         PathLookup::Met& met, Output output) const {
-    return tfdude::reach_at(ends, absent, at, query, reading, met, output);
+    return tfdude::reach_at(ends, Own::kAbsent, at, query, reading, met, output);
   }
   std::vector<std::string> unspecified(const Ends& ends, std::int64_t t) const {
     return unspecified_edges(ends, t, reading);
@@ -380,7 +375,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
     return ends;
   };
   const auto answer = [&](const std::vector<Ends>& ends) {
-    Result<SegmentValues> found = asked_segments(Own{passing(edges)}, ends, query, hint);
+    Result<SegmentValues> found = asked_segments(Own(), ends, query, hint);
     if (!found) {
       found = tl::unexpected(explained(std::move(found.error()), ends, query, impl_->now_));
       return found;
@@ -409,7 +404,7 @@ Result<SegmentValues> Forest::lookup_segments(const std::vector<PathEnds>& segme
   RemoteReading reading(others);
   Result<SegmentValues> found;
   const auto read = [&](RemoteReading& now, SegmentValues& values) -> Result<void> {
-    auto asked = asked_segments(Others{now, passing(motion)}, *ends, query, hint);
+    auto asked = asked_segments(Others{now}, *ends, query, hint);
     if (!asked) return tl::unexpected(std::move(asked.error()));
     values = *std::move(asked);
     values.commit = now.commit();

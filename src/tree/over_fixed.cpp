@@ -48,6 +48,7 @@ class TwoWays {
         same_instant_(same_instant),
         a_is_later_(a_is_later) {
     leave_out_beginning();
+    join_lasting_sources();
     const Pose X_FA = find_gains(a_);
     const Pose X_FB = find_gains(b_);
     const Matrix6d to_b_from_a = -adjoint(X_FB.inverse() * X_FA);
@@ -119,10 +120,20 @@ class TwoWays {
       const bool still = same_instant_ || !(one.moving || other.moving);
       return one.id == other.id && one.up == other.up && still;
     };
-    const auto [a, b] =
-        std::mismatch(a_.edges.begin(), a_.edges.end(), b_.edges.begin(), b_.edges.end(), is_same);
+    const auto [a, b] = std::mismatch(a_.edges.begin(), a_.edges.end(), b_.edges.begin(),
+                                      b_.edges.end(), is_same);
     a_.edges.erase(a_.edges.begin(), a);
     b_.edges.erase(b_.edges.begin(), b);
+  }
+
+  void join_lasting_sources() {
+    std::vector<ErrorsOfEdge> all;
+    for (Way* way : {&a_, &b_}) {
+      for (EdgeFromFixed& edge : way->edges) {
+        all.push_back({&edge.X_PC.common_errors, !edge.moving || edge.drifts});
+      }
+    }
+    join_lasting(all);
   }
 
   // Those to the error at the end of the way. Returns the pose there.
@@ -351,7 +362,9 @@ StampedTransform over_fixed(const StampedTransform& X_FA, const StampedTransform
   for (std::string& id : unspecified) {
     if (ways.has(id)) basis.unspecified.push_back(std::move(id));
   }
-  basis.sources = ways.sources();
+  for (const std::string& source : ways.sources()) {
+    add_once({std::string(shown_source(source))}, basis.sources);
+  }
   ways.relate();
   static_cast<Transform&>(X_AB) = ways.X_AB(order);
   if (!basis.unspecified.empty()) X_AB.covariance.set_complete(false);

@@ -20,8 +20,8 @@ class PathLookup {
   /// @param clock  tells how long ago that was for which an edge has no data; may be null
   PathLookup(const Frames& frames, const Forest::Clock& clock) : frames_(frames), clock_(clock) {}
 
-  /// Whether absent frames end the climb, or may be passed: on a part of a path, or a single edge.
-  enum class Absent { kEnds, kMayPass, kBeyondEdge };
+  /// Whether absent frames end the climb, or may be passed: on a part of a path.
+  enum class Absent { kEnds, kMayPass };
 
   /// What a walk has found.
   struct Met {

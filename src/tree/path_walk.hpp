@@ -119,12 +119,10 @@ template <class Value, class Others>
 Result<void> walk_at(const Ends& ends, PathLookup::Absent absent, const PathLookup::Instant& at,
                      const Query& query, Others& others, PathLookup::Met& met, Value& X_AB) {
   if constexpr (std::is_same_v<Value, Belief>) {
-    if (absent != PathLookup::Absent::kBeyondEdge) {
-      SourceInstants sources;
-      auto found = walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
-      if (!found || !sources.begin_naming(absent == PathLookup::Absent::kMayPass)) return found;
-      return walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
-    }
+    SourceInstants sources;
+    auto found = walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
+    if (!found || !sources.begin_naming(absent == PathLookup::Absent::kMayPass)) return found;
+    return walk_once_at(ends, absent, at, query, others, &sources, met, X_AB);
   }
   return walk_once_at(ends, absent, at, query, others, nullptr, met, X_AB);
 }

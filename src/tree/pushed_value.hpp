@@ -11,6 +11,8 @@
 #include "tfdude/types/correlation.hpp"
 #include "tfdude/types/edge.hpp"
 
+#include "math/instant_sources.hpp"
+
 namespace tfdude {
 
 /// How much of an edge, under this parent, a watcher has seen; initially nothing.
@@ -76,9 +78,12 @@ void join_histories(std::vector<PushedValue>& values);
 /// if only itself, tell that from what is said of its edge; of a segment, earlier versions told it
 /// by the sources.
 [[nodiscard]] inline bool is_of_sample(const PushedValue& value) {
+  const auto is_of_it = [](const CommonError& one) {
+    return is_observed(one) || is_of_two_samples(one.source);
+  };
   const auto& errors = value.correlation.common_errors;
   return value.stamp && (!value.correlation.observed_with.empty() ||
-                         std::any_of(errors.begin(), errors.end(), is_observed));
+                         std::any_of(errors.begin(), errors.end(), is_of_it));
 }
 
 /// Values written to edges up to a commit.

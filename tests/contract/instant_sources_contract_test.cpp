@@ -2,8 +2,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -14,6 +16,7 @@
 #include "support/joint_frames.hpp"
 #include "support/networks.hpp"
 #include "support/process.hpp"
+#include "support/random.hpp"
 
 // All is on one line, so that errors are linear in what disturbs: each is found from one run an
 // independent disturbance, without any model of the filter.
@@ -235,6 +238,124 @@ TEST_CASE("instants: a joint that others mimic has another error in its next sam
     CHECK(sigma("finger") >= std::sqrt(2e-4) * (1 - 1e-6));
     CHECK(sigma("finger") < 2.1e-2);
     CHECK(sigma("thumb") >= std::sqrt(2e-4) * (1 - 1e-6));
+  }
+}
+
+constexpr int kSupplies = 4;  // at the steps 0 to 3
+
+// world -> first (samples at 1 and 3) -> second (at 0, 2 and 3), whose errors of one source cancel
+// where they are the same. What is seen at 1 says how long the path is.
+class Opposed {
+ public:
+  // @param disturbed  as of Line; beyond the supplies: the sightings
+  explicit Opposed(int disturbed) : disturbed_(disturbed) {
+    const auto moving = [](const std::string& id, const std::string& parent) {
+      FrameSpec frame{id, parent, Transform::exact({})};
+      frame.timing = EdgeTiming();
+      frame.timing->moving = true;
+      return frame;
+    };
+    node_.emplace(
+        Node::open(network_.join(), "robot",
+                   {{"world", "", {}}, moving("first", "world"), moving("second", "first")})
+            .value());
+    REQUIRE(node_->correlate("first", {false, {{"supply", false, loading(kSupply)}}, {}}));
+    REQUIRE(node_->correlate("second", {false, {{"supply", false, loading(-kSupply)}}, {}}));
+    for (const int step : {1, 3}) tell("first", step, kSupply);
+    for (const int step : {0, 2, 3}) tell("second", step, -kSupply);
+  }
+
+  void see(const std::string& from, const std::string& to, double sigma, int number) {
+    const Transform Z{along_x(sigma * drawn(kSupplies + number)).pose, on_line(sigma * sigma)};
+    const auto found = node_->observe(from, to, Z, at(1), {1.0, true});
+    REQUIRE(found);
+    REQUIRE(found->accepted);
+  }
+  [[nodiscard]] StampedTransform asked(const std::string& from, const std::string& to, Time when) {
+    Query query;
+    query.at = when;
+    const auto X = node_->lookup(from, to, query);
+    REQUIRE(X);
+    return *X;
+  }
+
+ private:
+  void tell(const std::string& id, int step, double by) {
+    const double own = kOwn;
+    REQUIRE(node_->update(id, {along_x(by * drawn(step)).pose, on_line(own * own)}, at(step)));
+  }
+  [[nodiscard]] double drawn(int number) const { return number == disturbed_ ? 1 : 0; }
+
+  static constexpr double kOwn = 1e-6;
+  LoopbackNetwork network_;
+  std::optional<Node> node_;
+  const int disturbed_;
+};
+
+TEST_CASE("instants: a measurement that says nothing does not make errors of two samples one") {
+  Opposed line(-1);
+  const double before = line.asked("world", "second", at(1)).covariance.if_complete()->upper()[0];
+  CHECK(std::sqrt(before) == Approx(2 * kSupply).epsilon(1e-6));
+  for (int number = 0; number < 3; ++number) {
+    line.see("world", "second", 1000, number);
+    const StampedTransform X = line.asked("world", "second", at(1));
+    INFO("after " << number + 1);
+    CHECK(X.covariance.if_complete()->upper()[0] == Approx(before).epsilon(1e-6));
+    CHECK(X.basis.bound);
+  }
+}
+
+TEST_CASE("instants: an observation between samples is honest for any relation of their errors") {
+  struct Sighting {
+    const char* from;
+    const char* to;
+    double sigma;
+  };
+  const std::vector<std::vector<Sighting>> plans = {
+      {{"world", "second", 0.02}},
+      {{"world", "second", 0.02}, {"first", "second", 0.03}},
+      {{"first", "second", 0.01}, {"world", "second", 0.02}, {"world", "second", 0.02}}};
+  const std::vector<std::pair<const char*, const char*>> paths = {
+      {"world", "first"}, {"first", "second"}, {"world", "second"}};
+  testing::Random random(7153);
+  INFO("seed " << random.seed());
+  for (const auto& plan : plans) {
+    const int errors = kSupplies + static_cast<int>(plan.size());
+    // What an answer has of each error, and what it claims.
+    std::map<std::pair<std::size_t, int>, std::vector<double>> shares;
+    std::map<std::pair<std::size_t, int>, double> claimed;
+    for (int disturbed = 0; disturbed < errors; ++disturbed) {
+      Opposed line(disturbed);
+      for (std::size_t i = 0; i < plan.size(); ++i) {
+        line.see(plan[i].from, plan[i].to, plan[i].sigma, static_cast<int>(i));
+      }
+      for (std::size_t i = 0; i < paths.size(); ++i) {
+        for (const int tenths : {10, 15, 20, 25}) {
+          const Time when = at(0) + std::chrono::milliseconds(10 * tenths);
+          const StampedTransform X = line.asked(paths[i].first, paths[i].second, when);
+          shares[{i, tenths}].push_back(X.pose.translation().x());
+          claimed[{i, tenths}] = X.covariance.if_complete()->upper()[0];
+        }
+      }
+    }
+    for (const auto& [answer, all] : shares) {
+      INFO("plan " << &plan - plans.data() << ", path " << answer.first << " at step "
+                   << 0.1 * answer.second);
+      for (int i = 0; i < 100; ++i) {
+        Eigen::Vector3d of_supply = Eigen::Vector3d::Zero();
+        double variance = 0;
+        for (int k = 0; k < errors; ++k) {
+          const double share = all[static_cast<std::size_t>(k)];
+          if (k < kSupplies) {
+            of_supply += share * random.direction();
+          } else {
+            variance += share * share;
+          }
+        }
+        variance += of_supply.squaredNorm();
+        CHECK(claimed[answer] >= variance * (1 - 1e-6));
+      }
+    }
   }
 }
 

@@ -192,6 +192,40 @@ Injected inject(std::size_t kind, std::optional<Robot>& robot, const testing::Jo
   return cause;
 }
 
+TEST_CASE("why: shares of a source at different samples add up to the variance") {
+  const auto join = testing::join_loopback();
+  const auto moving = [](const std::string& id, const std::string& parent) {
+    FrameSpec frame{id, parent, Transform::exact({})};
+    frame.timing = EdgeTiming();
+    frame.timing->moving = true;
+    return frame;
+  };
+  auto robot = Node::open(join("robot"), "robot",
+                          {{"base", "", {}}, moving("arm", "base"), moving("hand", "arm")});
+  auto client = Client::open(join(""));
+  REQUIRE((robot && client));
+  const auto at = [](int ms) { return Time(std::chrono::milliseconds(ms)); };
+  Correlation heat;
+  Loading along_y = Loading::Zero(6, 1);
+  along_y(1, 0) = 2e-3;
+  heat.common_errors.push_back({"heat", false, along_y});
+  REQUIRE(robot->correlate("arm", heat));
+  heat.common_errors[0].loading *= -1;
+  REQUIRE(robot->correlate("hand", heat));
+  for (const int ms : {1000, 2000}) REQUIRE(robot->update("arm", Transform::exact({}), at(ms)));
+  for (const int ms : {1000, 1500, 2000}) {
+    REQUIRE(robot->update("hand", Transform::exact({}), at(ms)));
+  }
+  WhyQuery query;
+  query.at = at(1500);
+  const Explanation why = client->why("base", "hand", query);
+  REQUIRE(why.X_AB);
+  CHECK(why.variance == Approx(16e-6));
+  REQUIRE(why.sources.size() == 1);
+  CHECK(why.sources[0].name == "heat");
+  CHECK(why.sources[0].variance == Approx(16e-6));
+}
+
 }  // namespace
 
 TEST_CASE("why: injected causes are named, in time for people") {

@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "math/instant_sources.hpp"
+#include "math/mean_velocity.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "tree/forest.hpp"
+#include "tree/over_fixed.hpp"
 
 // Edges that name one source, at instants of which not all have a sample. All is on one line, so
 // that each error is a sum over the source's errors at the stamps.
@@ -153,7 +155,7 @@ TEST_CASE("What an observation has left of an instant does not cancel between sa
   CHECK(line.between("a", "c", 1).basis.bound);
 }
 
-TEST_CASE("Parts of a path name what comes from two samples, and single edges do not") {
+TEST_CASE("Parts of a path and single edges name what comes from two samples") {
   Line line;
   line.add("a", {0, 2});
   Query query;
@@ -165,7 +167,8 @@ TEST_CASE("Parts of a path name what comes from two samples, and single edges do
   };
   CHECK(name(1, false) == "observed:#1000000000,1200000000=supply");
   CHECK(name(2, false) == "supply");
-  CHECK(name(1, true) == "supply");
+  CHECK(name(1, true) == "observed:#1000000000,1200000000=supply");
+  CHECK(name(2, true) == "supply");
 }
 
 TEST_CASE("No relation of a source's errors at several instants exceeds what a lookup claims") {
@@ -188,6 +191,115 @@ TEST_CASE("No relation of a source's errors at several instants exceeds what a l
     add_shares(shares, all[1], t, 1);
     const double claimed = line.sigma("a", "b", t);
     CHECK(claimed >= independent(shares) - 1e-9);
+    for (int i = 0; i < 20; ++i) CHECK(claimed >= related(shares, random) - 1e-9);
+  }
+}
+
+// world -> a -> b, whose errors of the source are opposed.
+class Chain {
+ public:
+  Chain() { REQUIRE(forest.add("world", "", {})); }
+
+  void add(const std::string& id, const std::string& parent, double sign,
+           const std::vector<double>& steps) {
+    REQUIRE(forest.add(id, parent, Transform::exact({})));
+    Correlation said = supply();
+    said.common_errors[0].loading *= sign;
+    REQUIRE(forest.correlate(id, said));
+    for (const double step : steps) REQUIRE(forest.update(id, Transform::exact({}), at(step)));
+  }
+  [[nodiscard]] std::vector<EdgeFromFixed> edges(double step) const {
+    Query query;
+    query.at = at(step);
+    const auto found = edges_from_fixed(forest, "world", "b", query);
+    REQUIRE(found);
+    return *found;
+  }
+  // The pose of b at the first step, there at the second one.
+  [[nodiscard]] StampedTransform since(double first, double second) const {
+    const StampedTransform X_FA{Transform::exact({}), at(first)};
+    const StampedTransform X_FB{Transform::exact({}), at(second)};
+    return over_fixed(X_FA, X_FB, edges(first), edges(second), Order::kSecond);
+  }
+  // Over one second.
+  [[nodiscard]] MeanVelocity velocity(double first, double second) const {
+    const auto before = edges(first);
+    const auto after = edges(second);
+    std::vector<EdgeAtEnds> ends;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      ends.push_back({before[i].X_PC, after[i].X_PC, ObservedEdge::Way::kDown, !before[i].moving,
+                      before[i].drifts});
+    }
+    return mean_velocity(ends, 1);
+  }
+
+  Forest forest{[] { return at(0); }};
+};
+
+double sigma_of(const StampedTransform& X) {
+  return std::sqrt(X.covariance.if_complete()->upper()[0]);
+}
+
+TEST_CASE("A source of different samples does not cancel at an end of two instants") {
+  Chain chain;
+  chain.add("a", "world", 1, {0, 2, 4, 6});
+  chain.add("b", "a", -1, {1, 3, 5});
+  const StampedTransform X = chain.since(2, 4);
+  CHECK(sigma_of(X) == Approx(4 * kSize));
+  CHECK(X.basis.bound);
+  CHECK(X.basis.sources == std::vector<std::string>{"supply"});
+  const MeanVelocity velocity = chain.velocity(2, 4);
+  CHECK(std::sqrt(velocity.covariance.upper()[0]) == Approx(4 * kSize));
+  CHECK(velocity.bound);
+  CHECK(velocity.sources == std::vector<std::string>{"supply"});
+}
+
+TEST_CASE("A source of the same samples cancels at each of two instants") {
+  Chain chain;
+  chain.add("a", "world", 1, {0, 1, 2, 3});
+  chain.add("b", "a", -1, {0, 1, 2, 3});
+  for (const double step : {0.5, 1.25, 2.0}) {
+    INFO("step " << step);
+    CHECK(sigma_of(chain.since(step, 2.5)) == Approx(0).margin(1e-9));
+    CHECK_FALSE(chain.since(step, 2.5).basis.bound);
+    CHECK(chain.velocity(step, 2.5).covariance.upper()[0] == Approx(0).margin(1e-12));
+  }
+}
+
+TEST_CASE("A source that a static edge makes last is one error at two instants") {
+  Chain chain;
+  chain.add("a", "world", 1, {0, 2, 4});
+  chain.add("b", "a", -1, {});
+  CHECK(sigma_of(chain.since(1, 3)) == Approx(0).margin(1e-9));
+  CHECK(chain.velocity(1, 3).covariance.upper()[0] == Approx(0).margin(1e-12));
+}
+
+TEST_CASE("No relation of a source's errors exceeds what is claimed at two instants") {
+  Random random(7152);
+  INFO("seed " << random.seed());
+  for (int run = 0; run < 100; ++run) {
+    Chain chain;
+    std::vector<std::vector<double>> all;
+    for (const bool first : {true, false}) {
+      std::vector<double>& steps = all.emplace_back();
+      for (int step = 0; step <= 6; ++step) {
+        if (step == 0 || step == 6 || random.uniform(0, 1) < 0.5) steps.push_back(step);
+      }
+      chain.add(first ? "a" : "b", first ? "world" : "a", first ? 1 : -1, steps);
+    }
+    const double begin = 0.5 * static_cast<double>(random.index(13));
+    const double end = 0.5 * static_cast<double>(random.index(13));
+    Shares shares;
+    for (const double sign : {1.0, -1.0}) {
+      const auto& steps = all[sign > 0 ? 0 : 1];
+      add_shares(shares, steps, begin, -sign);
+      add_shares(shares, steps, end, sign);
+    }
+    const double claimed = sigma_of(chain.since(begin, end));
+    const double of_velocity = std::sqrt(chain.velocity(begin, end).covariance.upper()[0]);
+    INFO("run " << run << " from " << begin << " to " << end);
+    CHECK(claimed >= independent(shares) - 1e-9);
+    if (begin != end) CHECK(of_velocity == Approx(claimed).margin(1e-9));
     for (int i = 0; i < 20; ++i) CHECK(claimed >= related(shares, random) - 1e-9);
   }
 }
