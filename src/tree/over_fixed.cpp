@@ -25,6 +25,23 @@ Covariance mapped(const Matrix6d& G, const Covariance& sigma) {
 
 bool is_zero(const Covariance& sigma) { return sigma.upper() == Covariance::Upper{}; }
 
+// Whether it is one value, of one error, but for rounding: both may have come on different ways.
+bool is_same(const Belief& a, const Belief& b) {
+  const auto near = [](const auto& x, const auto& y) {
+    return x.cols() == y.cols() && (x - y).norm() <= 1e-9 * x.norm();
+  };
+  const auto is_same_error = [&](const CommonError& x, const CommonError& y) {
+    return same_source(x, y) && near(x.loading, y.loading);
+  };
+  const auto unknown = [](const Belief& X) { return X.unknown.value_or(Covariance()).matrix(); };
+  const auto& errors = b.common_errors;
+  return log(a.pose.inverse() * b.pose).norm() <= 1e-12 * (1 + a.pose.translation().norm()) &&
+         a.unspecified == b.unspecified && near(a.own.matrix(), b.own.matrix()) &&
+         near(unknown(a), unknown(b)) &&
+         std::equal(a.common_errors.begin(), a.common_errors.end(), errors.begin(), errors.end(),
+                    is_same_error);
+}
+
 void scale(Covariance& sigma, double by) {
   Covariance::Upper upper = sigma.upper();
   for (double& one : upper) one *= by;
@@ -114,14 +131,14 @@ class TwoWays {
     }
   };
 
-  // Up to the first edge that may have moved, both ways are the same, and so is their error.
+  // Up to the first edge that may have another value, both ways are the same, and so is the error.
   void leave_out_beginning() {
-    const auto is_same = [&](const EdgeFromFixed& one, const EdgeFromFixed& other) {
+    const auto is_same_edge = [&](const EdgeFromFixed& one, const EdgeFromFixed& other) {
       const bool still = same_instant_ || !(one.moving || other.moving);
-      return one.id == other.id && one.up == other.up && still;
+      return one.id == other.id && one.up == other.up && still && is_same(one.X_PC, other.X_PC);
     };
     const auto [a, b] = std::mismatch(a_.edges.begin(), a_.edges.end(), b_.edges.begin(),
-                                      b_.edges.end(), is_same);
+                                      b_.edges.end(), is_same_edge);
     a_.edges.erase(a_.edges.begin(), a);
     b_.edges.erase(b_.edges.begin(), b);
   }
@@ -152,7 +169,10 @@ class TwoWays {
   // How the error at the later instant follows from that at the earlier one, if it does.
   [[nodiscard]] std::optional<Drift> drift_of(const EdgeFromFixed& earlier,
                                               const EdgeFromFixed& later) const {
-    if (!is_free(earlier) && !is_free(later)) return Drift();
+    if (!is_free(earlier) && !is_free(later)) {
+      // Of two states, the values may differ.
+      return is_same(earlier.X_PC, later.X_PC) ? std::optional(Drift()) : std::nullopt;
+    }
     const bool drifts = earlier.drifts && later.drifts && earlier.corrected == later.corrected;
     if (!drifts) return std::nullopt;
     return drift_between(earlier.X_PC, later.X_PC);

@@ -225,6 +225,37 @@ TEST_CASE("over fixed: no correlation of the dynamic edges exceeds it, and all o
   }
 }
 
+TEST_CASE("over fixed: two values of a static edge may have errors of any relation") {
+  Random random(4713);
+  INFO("seed " << random.seed());
+  for (int round = 0; round < 100; ++round) {
+    INFO("round " << round);
+    Ways ways = random_ways(random);
+    // As of two states, between which it was told anew; or only its error.
+    EdgeFromFixed first = edge_of("base", random.pose(), random.covariance(0.02, 0.01),
+                                  Kind::kStatic, random.index(2) == 0);
+    EdgeFromFixed then = first;
+    if (random.index(3) > 0) then.X_PC.pose = first.X_PC.pose * exp(random.twist(0.5, 0.5));
+    then.X_PC.own = random.covariance(0.02, 0.01);
+    ways.to_a.insert(ways.to_a.begin(), first);
+    ways.to_b.insert(ways.to_b.begin(), then);
+    const StampedTransform X_AB = answer(ways);
+    const Matrix6d sigma = X_AB.covariance.of_specified().matrix();
+    CHECK(X_AB.basis.bound);
+    auto pairs = pairs_of(ways);
+    const Pair base = pairs.at("base");
+    pairs.erase("base");
+    for (int k = 0; k < 50; ++k) {
+      const Twist v = k < 6 ? Twist(Twist::Unit(k)) : random_direction(random);
+      const Share others = share_of(ways, pairs, v);
+      const double both = deviation(base.J_a, first.X_PC.own.matrix(), v) +
+                          deviation(base.J_b, then.X_PC.own.matrix(), v);
+      const double worst = others.worst + both * both;
+      CHECK(v.dot(sigma * v) > worst * (1 - 1e-6) - 1e-12);
+    }
+  }
+}
+
 TEST_CASE("over fixed: unspecified edges leave the covariance of all others") {
   Random random(4712);
   INFO("seed " << random.seed());
