@@ -11,14 +11,16 @@
 namespace tfdude::cli {
 namespace {
 
-// Only observations may use their prefix, and name the edges that they changed.
+// Only observations and joints may use their prefixes, and name the edges that they changed.
 constexpr std::string_view kReplayedPrefix = "replayed:";
 
 Correlation replayed(Correlation correlation) {
   correlation.observed_with.clear();
   for (CommonError& error : correlation.common_errors) {
-    if (!is_observed(error)) continue;
-    error.source = std::string(kReplayedPrefix) + error.source.substr(kObservedPrefix.size());
+    const bool observed = is_observed(error);
+    if (!observed && !is_of_joints(error.source)) continue;
+    if (observed) error.source.erase(0, kObservedPrefix.size());
+    error.source.insert(0, kReplayedPrefix);
   }
   return correlation;
 }
@@ -28,7 +30,7 @@ bool can_serve(const FrameSpec& spec) {
   const auto& sources = spec.correlation.common_errors;
   return check_new_id(spec.id, "id") &&
          std::all_of(sources.begin(), sources.end(), [](const CommonError& one) {
-           return check_new_id(one.source, "source").has_value();
+           return check_new_source(one.source).has_value();
          });
 }
 

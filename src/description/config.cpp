@@ -141,8 +141,7 @@ Result<CommonError> ConfigReader::common_error(const std::string& source, const 
       common_error.loading(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = *value;
     }
   }
-  auto ok =
-      check_common_errors({common_error}).and_then([&] { return check_new_id(source, "source"); });
+  auto ok = check_common_errors({common_error}).and_then([&] { return check_new_source(source); });
   if (!ok) {
     return error(Errc::kInvalidInput, field.mark, place + ": " + ok.error().message);
   }

@@ -15,8 +15,6 @@
 namespace tfdude {
 namespace {
 
-bool is_of_joint(const std::string& source) { return source.rfind(shared_source(""), 0) == 0; }
-
 bool has_named(const Belief& X, const std::string& name) {
   return std::any_of(X.common_errors.begin(), X.common_errors.end(), [&](const CommonError& one) {
     return one.source == name && !one.loading.isZero(0);
@@ -162,7 +160,7 @@ void ObservedInstants::merge_others(std::vector<ObservedEdge>& edges) const {
 void ObservedInstants::name(std::vector<ObservedEdge>& edges, bool merge) {
   name_between(edges);
   for (const Use& use : uses(edges)) {
-    const bool of_joint = is_of_joint(use.source);
+    const bool of_joint = is_of_joints(use.source);
     if (use.lasts && of_joint && has_instants_of(edges, use.source)) count_twice(edges, use.source);
     if (!use.lasts || of_joint) {
       rename(edges, use);

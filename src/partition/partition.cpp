@@ -27,7 +27,7 @@ bool are_too_many(const std::vector<PathCorrelation>& all) {
 Result<void> check_new_ids(const FrameSpec& frame) {
   auto ok = check_new_id(frame.id, "id");
   for (const CommonError& one : frame.correlation.common_errors) {
-    if (ok) ok = check_new_id(one.source, "source");
+    if (ok) ok = check_new_source(one.source);
   }
   return ok;
 }
@@ -365,7 +365,7 @@ Result<void> Partition::correlate(const std::string& id, const Correlation& corr
     return fail(Errc::kInvalidInput, who + ": only observations set what it was observed with");
   }
   for (const CommonError& one : correlation.common_errors) {
-    if (auto ok = check_new_id(one.source, "source"); !ok) return fail_at(who, ok.error());
+    if (auto ok = check_new_source(one.source); !ok) return fail_at(who, ok.error());
   }
   if (joints_.is_coupled(id)) {
     return fail(Errc::kInvalidInput, who +

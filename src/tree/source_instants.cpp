@@ -34,8 +34,7 @@ SourceInstants::Source* SourceInstants::find(const std::string& name) {
 void SourceInstants::note(const std::string& name, FromSamples from) {
   // Edges that one joint moves have their values from the same positions, whatever samples those
   // are told as.
-  static const std::string of_joints = shared_source({});
-  if (name.rfind(of_joints, 0) == 0) return;
+  if (is_of_joints(name)) return;
   Source* source = find(name);
   if (source == nullptr) source = &sources_.emplace_back(Source{name, from});
   source->lasts = source->lasts || from == kLasting;

@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
+constexpr std::string_view kOfJoints = "joint ";
+
 }  // namespace
 
 const char* to_string(JointType type) {
@@ -61,7 +63,16 @@ Result<void> check_joint(const JointSpec& joint) {
   });
 }
 
-std::string shared_source(const std::string& leader) { return "joint " + leader; }
+std::string shared_source(const std::string& leader) { return std::string(kOfJoints) + leader; }
+
+bool is_of_joints(std::string_view source) { return source.rfind(kOfJoints, 0) == 0; }
+
+Result<void> check_new_source(std::string_view source) {
+  if (auto ok = check_new_id(source, "source"); !ok) return ok;
+  if (!is_of_joints(source)) return {};
+  return fail(Errc::kInvalidInput,
+              "source " + quote(source) + ": names with this prefix are reserved for joints");
+}
 
 std::optional<double> own_variance(const JointSpec& joint, std::optional<double> variance) {
   return variance && joint.coupled ? 0.0 : variance;

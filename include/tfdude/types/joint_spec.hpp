@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tfdude/base/export.hpp"
@@ -116,6 +117,13 @@ struct JointValue {
 
 /// The source of the error that a joint shares with those that follow it.
 [[nodiscard]] TFDUDE_EXPORT std::string shared_source(const std::string& leader);
+
+/// Whether a source may be that of joints: its name begins as those of shared_source().
+[[nodiscard]] TFDUDE_EXPORT bool is_of_joints(std::string_view source);
+
+/// Checks the name of a source that a user gives to an edge.
+/// @return kInvalidInput: as check_new_id(), or the name is_of_joints()
+[[nodiscard]] TFDUDE_EXPORT Result<void> check_new_source(std::string_view source);
 
 /// The position assumed before the first sample: the one nearest to zero within the limits.
 [[nodiscard]] TFDUDE_EXPORT double rest_position(const std::optional<JointLimits>& limits);

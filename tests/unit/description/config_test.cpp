@@ -145,6 +145,8 @@ TEST_CASE("a frame may give the correlation of its error") {
           "sources: s is given twice");
   refused("sources: {'observed:1': [[1, 2, 3, 4, 5, 6]]}",
           "source 'observed:1': names with this prefix");
+  refused("sources: {joint supply: [[1, 2, 3, 4, 5, 6]]}",
+          "source 'joint supply': names with this prefix are reserved for joints");
 }
 
 TEST_CASE("limits of history are given for the file and for each frame") {

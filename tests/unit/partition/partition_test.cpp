@@ -272,6 +272,23 @@ TEST_CASE("a lookup over an edge that is not owned is rejected and names the end
 
 // Once, the owner looked up each of 4096 segments of 3000 edges, for 0.4 s, to name the one that it
 // does not own.
+TEST_CASE("a source that is named as those of joints is rejected for other edges") {
+  Arms arms;
+  arms.plant();
+  const Correlation said{false, {{"joint supply", false, Loading::Ones(6, 1)}}, {}};
+  const std::string why = "names with this prefix are reserved for joints";
+  FrameSpec named{"lamp", "arm", Transform::exact({})};
+  named.correlation = said;
+  const auto loaded = arms.partition.load({named}, kNow);
+  REQUIRE_FALSE(loaded);
+  CHECK(loaded.error().message.find(why) != std::string::npos);
+  const Reply reply = arms.ask("arm", CorrelateRequest{said});
+  const auto* error = std::get_if<Error>(&reply.body);
+  REQUIRE(error != nullptr);
+  CHECK(error->code == Errc::kInvalidInput);
+  CHECK(error->message.find(why) != std::string::npos);
+}
+
 TEST_CASE("a lookup of too many edges is rejected at once, whatever is wrong with it") {
   constexpr int kDeep = 3000;
   Arms arms;
