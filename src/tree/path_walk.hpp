@@ -47,6 +47,7 @@ Result<void> pass(PathAccumulation<Value>& path, const Edge& edge, Take& take) {
 template <class Value, class Others, class Take>
 Result<void> walk(const Ends& ends, PathLookup::Absent absent, Order order, Others& others,
                   Take take, Value& X_AB) {
+  if constexpr (!Others::kNone) others.begin_walk();
   const Version* a = ends.a;
   const Version* b = ends.b;
   PathAccumulation<Value> path_a = begin_path<Value>(order);

@@ -151,8 +151,10 @@ class RemoteReading {
   void clear() {
     taken_ = {};
     used_ = false;
-    common_errors_left_ = kMostCommonErrors;
+    begin_walk();
   }
+  /// What is read from now on is added up by itself.
+  void begin_walk() { common_errors_left_ = kMostCommonErrors; }
   /// Whether anything was found since then.
   [[nodiscard]] bool used() const { return used_; }
   /// At which commit the owner was read; 0: none was, or several.
@@ -168,7 +170,7 @@ class RemoteReading {
   }
 
  private:
-  // Of all edges together, as the time to add them up is that of their square.
+  // Of all edges of a walk together, as the time to add them up is that of their square.
   static constexpr std::size_t kMostCommonErrors = 1024;
 
   struct Snapshot {

@@ -398,6 +398,39 @@ struct Branched {
   RemoteEdges others;
 };
 
+TEST_CASE("a walk reads as many common errors as one before it") {
+  constexpr int kEdges = 30;
+  SharedForest arm;
+  RemoteEdges others;
+  Forest here;
+  others.attach(1, arm.seen(), nullptr);
+  Correlation said;
+  for (int i = 0; i < 10; ++i) {
+    said.common_errors.push_back({"s" + std::to_string(i), false, 0.01 * Loading::Ones(6, 1)});
+  }
+  REQUIRE(arm.forest.add("f0", "", {}));
+  REQUIRE(here.put_remote("f0", "", 1));
+  for (int i = 1; i <= kEdges; ++i) {
+    const std::string id = "f" + std::to_string(i);
+    const std::string parent = "f" + std::to_string(i - 1);
+    REQUIRE(arm.forest.add(id, parent, along_x(0)));
+    REQUIRE(here.put_remote(id, parent, 1));
+    REQUIRE(arm.forest.correlate(id, said));
+    // Of different stamps, so that a second walk names the sources.
+    for (const int ms : {0, 20 + i}) REQUIRE(arm.forest.update(id, along_x(0.1), at_ms(ms)));
+  }
+  Query query;
+  query.at = at_ms(10);
+  const std::string last = "f" + std::to_string(kEdges);
+  const auto found =
+      read(here, others, "f0", last, [&] { return here.lookup("f0", last, query, others); });
+  const auto expected = arm.forest.lookup("f0", last, query);
+  REQUIRE(expected);
+  REQUIRE(found);
+  CHECK(expected->basis.bound);
+  CHECK(transform_diff(*found, *expected, 1e-12) == "");
+}
+
 TEST_CASE("an edge that its owner has moved is not read until that is known here") {
   Branched branched;
   SharedForest& arm = branched.arm;
