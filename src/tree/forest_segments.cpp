@@ -280,7 +280,10 @@ SegmentValues values_of(const From& from, const std::vector<Ends>& segments,
   }
   const auto none = [](const auto& one) { return one.correlation.empty(); };
   if (std::all_of(reached.begin(), reached.end(), none)) return found;
-  for (auto& one : reached) found.correlations.push_back(std::move(one.correlation));
+  for (auto& one : reached) {
+    fold_samples(one.correlation);
+    found.correlations.push_back(std::move(one.correlation));
+  }
   return found;
 }
 

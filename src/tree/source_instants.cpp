@@ -71,4 +71,16 @@ bool SourceInstants::begin_naming(bool part) {
   return naming_;
 }
 
+void fold_samples(PathCorrelation& correlation) {
+  auto& errors = correlation.common_errors;
+  if (errors.size() <= kMaxCommonErrors) return;
+  const auto first = std::stable_partition(
+      errors.begin(), errors.end(), [](const auto& one) { return !is_of_two_samples(one.source); });
+  if (first == errors.end()) return;
+  const Belief folded{{}, {}, {}, {first, errors.end()}, false};
+  const Covariance sigma = collapse(folded).covariance.of_specified();
+  errors.erase(first, errors.end());
+  correlation.unknown = correlation.unknown ? bound(*correlation.unknown, sigma) : sigma;
+}
+
 }  // namespace tfdude

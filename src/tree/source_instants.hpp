@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tfdude/math/belief.hpp"
+#include "tfdude/types/correlation.hpp"
 
 #include "tree/versions.hpp"
 
@@ -56,5 +57,10 @@ class SourceInstants {
   std::vector<CommonError> named_;
   bool naming_ = false;
 };
+
+/// If a segment has more common errors than a message may have: what its edges have of each two
+/// samples becomes part of what is of unknown correlation. As a source has a name for each two
+/// stamps, there may be many.
+void fold_samples(PathCorrelation& correlation);
 
 }  // namespace tfdude

@@ -195,6 +195,38 @@ TEST_CASE("No relation of a source's errors at several instants exceeds what a l
   }
 }
 
+TEST_CASE("A segment of many samples has no more common errors than a message") {
+  constexpr int kEdges = 140;
+  Forest forest{[] { return at(0); }};
+  REQUIRE(forest.add("f0", "", {}));
+  for (int i = 1; i <= kEdges; ++i) {
+    const std::string id = "f" + std::to_string(i);
+    REQUIRE(forest.add(id, "f" + std::to_string(i - 1), Transform::exact({})));
+    REQUIRE(forest.correlate(id, supply()));
+    for (const double step : {0.0, 2.0}) {
+      REQUIRE(forest.update(id, Transform::exact({}), at(step + 0.001 * i)));
+    }
+    REQUIRE(forest.update(id, Transform::exact({}), at(4)));
+  }
+  Query query;
+  query.at = at(1);
+  // At the newest instant all have a sample; between, as many errors as edges.
+  const std::vector<PathEnds> asked = {{"f0", "f" + std::to_string(kEdges)}};
+  for (const bool hinted : {false, true}) {
+    INFO((hinted ? "hint" : "asked"));
+    const auto found =
+        forest.lookup_segments(asked, hinted ? Query{} : query, hinted ? query.at : std::nullopt);
+    REQUIRE(found);
+    const ValuesAtInstant& there = hinted ? found->at_hint : *found;
+    REQUIRE(there.correlations.size() == 1);
+    CHECK(there.correlations[0].common_errors.size() <= kMaxCommonErrors);
+    // All errors may be one.
+    const Transform X = collapse(belief_of(there.values[0], there.correlations[0]));
+    const double sigma = std::sqrt(X.covariance.if_complete()->upper()[0]);
+    CHECK(sigma == Approx(kEdges * kSize));
+  }
+}
+
 // world -> a -> b, whose errors of the source are opposed.
 class Chain {
  public:
