@@ -36,8 +36,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How many readers an owner admits, how many it hears at once, as any user of the computer may call,
-// and how long it waits for what one says first.
+// How many readers an owner admits, how many it hears at once, as any user of the computer may
+// call, and how long it waits for what one says first.
 constexpr std::size_t kMostReaders = 1024;
 constexpr std::ptrdiff_t kMostHeard = 32;
 constexpr std::chrono::milliseconds kPatience{1000};

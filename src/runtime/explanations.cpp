@@ -110,7 +110,7 @@ Explanation Explanations::why(const std::string& a, const std::string& b, const 
   Explanation explanation;
   auto found = lookups_.lookup<std::string_view>(a, b, lookup, first);
   if (!found && found.error().code == Errc::kTimeout && !discovery_.complete()) {
-    // Who has just joined hears last of partitions that are lost.
+    // A program that has just joined hears last of partitions that are lost.
     found = lookups_.lookup<std::string_view>(a, b, lookup, deadline);
   }
   if (!found) {

@@ -323,8 +323,8 @@ class TFDUDE_EXPORT Client {
   [[nodiscard]] PendingLookup lookup_async(const std::string& a, const std::string& b,
                                            const Query& query, Milliseconds wait,
                                            PendingLookup::Callback callback);
-  /// As above, with a future. It is ready after `wait`, or the deadline of a call without a wait, at
-  /// the latest, or when the client is destroyed.
+  /// As above, with a future. It is ready when the client is destroyed, and at the latest after
+  /// `wait`; without a wait, at the deadline of a call.
   [[nodiscard]] std::future<Result<StampedTransform>> lookup_async(const std::string& a,
                                                                    const std::string& b,
                                                                    const Query& query,

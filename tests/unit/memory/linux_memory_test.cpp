@@ -214,7 +214,7 @@ TEST_CASE("callers that say nothing take few descriptors of an owner, and others
   }
   REQUIRE(silent.size() > 50);
   const auto own = static_cast<std::ptrdiff_t>(silent.size());
-  // It hears the first ones, and would have taken all by then.
+  // The owner hears the first ones, and would have taken all by then.
   REQUIRE(eventually([&] { return descriptors() > before + own + 16; }));
   CHECK(descriptors() <= before + own + 40);
   // Each gets a second.
