@@ -105,7 +105,10 @@ web::Site make_site(web::Live& live, web::Recordings& recordings, const Files& f
 }
 
 int serve(const Settings& settings, const sigset_t& stop_signals) {
-  const auto files = read_files(settings);
+  const auto files = [&] {
+    const cli::EndAtSignals ends;
+    return read_files(settings);
+  }();
   auto live = files ? web::Live::open(settings.options, settings.server.rate)
                     : tl::unexpected(files.error());
   if (!live) {

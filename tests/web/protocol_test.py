@@ -3,10 +3,15 @@
 python3-websockets."""
 
 import asyncio
+import contextlib
 import json
 import math
+import os
+import signal
 import socket
 import struct
+import subprocess
+import tempfile
 import time
 import unittest
 import urllib.error
@@ -335,6 +340,29 @@ class Token(unittest.TestCase):
             with urllib.request.urlopen(urllib.request.Request(address + "app.js", headers={"Cookie": cookie}),
                                         timeout=rig.WAIT) as reply:
                 self.assertEqual(reply.status, 200)
+
+
+class SlowFile(unittest.TestCase):
+    def test_a_pipe_that_says_nothing_does_not_keep_a_server_that_is_to_end(self):
+        with tempfile.TemporaryDirectory() as folder:
+            pipe = os.path.join(folder, "robot.urdf")
+            os.mkfifo(pipe)
+            server = subprocess.Popen([rig.BIN / "tfdude-web", "--port", "0", "--urdf", pipe],
+                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            try:
+                writer = rig.eventually(lambda: self.writer_of(pipe), "a server that reads")
+                server.terminate()
+                self.assertEqual(server.wait(timeout=rig.WAIT), -signal.SIGTERM)
+                os.close(writer)
+            finally:
+                server.kill()
+                server.wait()
+
+    def writer_of(self, pipe):
+        """None: nobody reads it yet."""
+        with contextlib.suppress(OSError):
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        return None
 
 
 if __name__ == "__main__":
