@@ -271,5 +271,5 @@ def test_frames_of_a_file_have_its_history(tmp_path, network):
     frames = tfdude.load_config(str(file)).frames
     with tfdude.Node("robot", frames, network=network) as node:
         for second in range(0, 50, 10):
-            node.update_many(["arm", "tool"], [tfdude.Transform.exact()] * 2, 10**9 * second)
+            node.update_many(["arm", "tool"], [tfdude.Transform.exact()] * 2, stamp=10**9 * second)
         assert [node.history(frame)[0].samples for frame in ("arm", "tool")] == [5, 2]
