@@ -27,13 +27,15 @@ void insert(std::vector<std::optional<Place>>& places, const std::optional<Place
   if (!known) places.push_back(place);
 }
 
-// The frame and all above it, the root first; empty if one of them does not exist.
+// The frame and all above it, the topmost first; one whose parent does not exist is as a root.
+// Empty if the frame does not exist.
 template <class State>
 std::vector<std::string> way_down(const State& state, const std::string& id) {
   std::vector<std::string> way;
   for (std::string at = id; !at.empty();) {
     const auto frame = state.find(at);
-    if (frame == state.end() || !*frame->second || way.size() > state.size()) return {};
+    if (way.size() > state.size()) return {};
+    if (frame == state.end() || !*frame->second) break;
     way.insert(way.begin(), at);
     at = (*frame->second)->parent;
   }
@@ -50,7 +52,7 @@ std::optional<Transform> between(const State& state, const std::string& a, const
   for (const auto* way : {&to_a, &to_b}) {
     for (const std::string& id : *way) {
       const Place& place = **state.at(id);
-      oracle.add(id, place.parent, place.X_PC);
+      oracle.add(id, id == way->front() ? "" : place.parent, place.X_PC);
     }
   }
   return oracle.between(a, b);
