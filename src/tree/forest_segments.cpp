@@ -178,7 +178,6 @@ void describe(const std::vector<Ends>& segments, SegmentValues& found) {
 
 // As SegmentValues::said. A joint says another variance with each position.
 std::uint64_t said_of(const std::vector<Ends>& segments) {
-  static const std::string of_joints = shared_source({});
   std::uint64_t said = 0;
   const auto add = [&](std::uint64_t number) { said = (said ^ number) * 1099511628211U; };
   const std::hash<std::string_view> hash;
@@ -187,7 +186,7 @@ std::uint64_t said_of(const std::vector<Ends>& segments) {
     if (edge.correlation == nullptr) return;
     add(edge.correlation->said().unknown ? 2 : 3);
     for (const CommonError& one : edge.correlation->said().common_errors) {
-      if (one.source.rfind(of_joints, 0) == 0) continue;
+      if (is_of_joints(one.source)) continue;
       add(hash(one.source));
       const auto* loading = reinterpret_cast<const char*>(one.loading.data());
       add(hash({loading, static_cast<std::size_t>(one.loading.size()) * sizeof(double)}));
