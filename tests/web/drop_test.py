@@ -65,6 +65,7 @@ class Dropped(unittest.TestCase):
         self.assertEqual(self.drop(browser, b"not a recording", "a.txt"), [True, "none"])
         self.banner(browser, "no MCAP file")
         self.assertTrue(browser.execute_script("return " + live))
+        time.sleep(1)  # between two files
         self.drop(browser, 21 << 20, "large.mcap")
         self.banner(browser, "takes 20 MiB")
         # One is shown, at its end.
