@@ -104,6 +104,8 @@ int run(const Arguments& arguments) {
 }  // namespace tfdude::faults
 
 int main(int argc, char** argv) {
+  // If a time limit ends this, what was said before is known.
+  (void)std::setvbuf(stdout, nullptr, _IOLBF, 0);
   // This seed would be that of each of the random sequences here, which differ.
   unsetenv("TFDUDE_SEED");
   tfdude::faults::Arguments arguments;
