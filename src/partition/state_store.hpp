@@ -84,6 +84,10 @@ class StateStore {
   /// first change of a process, and one that says so, survive a power loss, too.
   /// @return kState.
   [[nodiscard]] virtual Result<void> save(const StateChange& change) = 0;
+
+  /// Sets room aside for the next change: one that is applied is not undone if it cannot be saved.
+  /// @return kState: there is none, so no change should be made.
+  [[nodiscard]] virtual Result<void> make_room() = 0;
 };
 
 }  // namespace tfdude

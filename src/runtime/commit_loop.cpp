@@ -37,12 +37,14 @@ CommitLoop::Clock::time_point CommitLoop::run() {
 Result<void> CommitLoop::round(bool values) {
   const Ready ready = commits_.begin(Clock::now(), values);
   Result<void> stored;
+  Result<void> room;
   if (ready.refused) {
     stored = tl::unexpected(*ready.refused);
   } else if (store_ != nullptr && !ready.rows.empty()) {
     stored = store_->save(ready.rows);
   }
-  commits_.finish(ready, stored, Clock::now());
+  if (store_ != nullptr && stored) room = store_->make_room();
+  commits_.finish(ready, stored, room, Clock::now());
   return stored;
 }
 

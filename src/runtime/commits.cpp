@@ -81,11 +81,14 @@ Ready Commits::begin(Clock::time_point now, bool values) {
   return effects_.take(values_due);
 }
 
-void Commits::finish(const Ready& ready, const Result<void>& stored, Clock::time_point now) {
+void Commits::finish(const Ready& ready, const Result<void>& stored, const Result<void>& room,
+                     Clock::time_point now) {
   const bool first = !started();
-  if (!first && !stored) note(stored);
+  const Result<void>& next = stored ? room : stored;
+  // Before anybody who is told now asks for more.
+  if (!next && (!first || stored)) note(next);
   tell(ready, stored);
-  if (!first && stored) note(stored);
+  if (next && !first) note(next);
   const Lock lock(mutex_);
   if (first) started_ = stored.has_value();
   if (first || values_due_) next_values_ = now + periods_.values;
@@ -128,7 +131,7 @@ void Commits::note(const Result<void>& stored) {
   if (!stored && (!before || before->message != stored.error().message)) {
     log().error("{}", stored.error().message);
   }
-  if (stored && before) log().warn("pending changes are stored again");
+  if (stored && before) log().warn("changes are stored again");
 }
 
 }  // namespace tfdude

@@ -15,8 +15,8 @@ namespace tfdude {
 /// runs the rounds.
 ///
 /// If something could not be stored, nothing of it is published, and its requesters get kState.
-/// Storing is retried until it succeeds; meanwhile failure() says why further changes should be
-/// rejected.
+/// Storing is retried until it succeeds, and there is room for more; meanwhile failure() says why
+/// further changes should be rejected.
 ///
 /// @par Thread safety  All functions are thread-safe; those of rounds are for one thread.
 class Commits {
@@ -75,7 +75,9 @@ class Commits {
   /// What must be stored now; finish() follows.
   /// @param values  also those that are not due yet
   [[nodiscard]] Ready begin(Clock::time_point now, bool values = false);
-  void finish(const Ready& ready, const Result<void>& stored, Clock::time_point now);
+  /// @param room  whether the next change can be stored
+  void finish(const Ready& ready, const Result<void>& stored, const Result<void>& room,
+              Clock::time_point now);
   /// There are no more.
   void end();
 

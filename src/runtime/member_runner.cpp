@@ -253,7 +253,7 @@ std::optional<Error> MemberRunner::refusal() const {
   if (!failure) return std::nullopt;
   return Error{failure->code,
                "partition " + quote(name_) +
-                   " accepts no changes until it can store the last ones: " + failure->message};
+                   " accepts no changes until it can store them: " + failure->message};
 }
 
 Error MemberRunner::unless_unsaved(Error error, const std::string& id) {

@@ -11,6 +11,7 @@
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
 #include "store/log_check.hpp"
+#include "store/log_room.hpp"
 #include "store/read_state.hpp"
 #include "store/row_sums.hpp"
 #include "store/rows.hpp"
@@ -37,7 +38,8 @@ std::string without_spaces(std::string_view text) {
 
 class SqliteStore final : public StateStore {
  public:
-  SqliteStore(std::string file, StoreSync sync) : file_(std::move(file)), sync_(sync) {}
+  SqliteStore(std::string file, StoreSync sync)
+      : file_(std::move(file)), sync_(sync), room_(file_ + "-wal") {}
 
   ~SqliteStore() override;
   SqliteStore(const SqliteStore&) = delete;
@@ -49,6 +51,7 @@ class SqliteStore final : public StateStore {
 
   Result<StoredState> load() override;
   Result<void> save(const StateChange& change) override;
+  Result<void> make_room() override;
 
   /// Erases the rows that are wrong. @return each of them
   Result<std::vector<std::string>> drop_wrong_rows();
@@ -77,6 +80,7 @@ class SqliteStore final : public StateStore {
 
   const std::string file_;
   const StoreSync sync_;
+  LogRoom room_;
   std::string partition_;
   std::optional<Database> database_;
   bool drops_damage_ = false;  // of the log
@@ -380,6 +384,15 @@ Result<void> SqliteStore::save(const StateChange& change) {
   return unusable(
       "was removed, moved or replaced while it was in use, so changes would be lost: put it back, "
       "or restart the process with what is there now");
+}
+
+// A log that was merged into the file is written from its beginning again.
+Result<void> SqliteStore::make_room() {
+  if (!written_ || room_.reserve()) return {};
+  const auto blocked = database_->number("PRAGMA wal_checkpoint(RESTART)");
+  if (blocked && *blocked == 0 && room_.is_inside()) return {};
+  return unusable("has no room on its disk for another change" +
+                  (blocked ? "" : ": " + blocked.error().message));
 }
 
 Result<void> SqliteStore::save_frames(const StateChange& change) {

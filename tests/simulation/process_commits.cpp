@@ -70,7 +70,7 @@ void Process::perform(const Ready& ready) {
       if (stored_last.first != one.since) stored_last = {one.since, world_.timeline.now()};
     }
   }
-  commits_.finish(ready, stored, now());
+  commits_.finish(ready, stored, {}, now());
   react();
 }
 

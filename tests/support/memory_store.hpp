@@ -44,6 +44,7 @@ class MemoryStore final : public StateStore {
     }
     return {};
   }
+  Result<void> make_room() override { return {}; }
 
  private:
   std::uint64_t epoch_ = 0;

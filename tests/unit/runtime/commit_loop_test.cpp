@@ -48,6 +48,7 @@ struct Disk {
   std::mutex mutex;
   std::condition_variable changed;
   bool full = false;
+  bool reserve_used = false;
   bool stands_still = false;
   std::atomic<int> writes{0};  // begun
 
@@ -70,6 +71,10 @@ class FakeStore final : public StateStore {
     for (const std::string& id : change.erased) line += " " + id;
     if (!change.values.empty()) line += " " + std::to_string(change.values.size()) + " values";
     return write(line);
+  }
+  Result<void> make_room() override {
+    const std::lock_guard lock(disk_.mutex);
+    return disk_.reserve_used ? fail(Errc::kState, "there is no room") : Result<void>();
   }
 
  private:
@@ -217,6 +222,20 @@ TEST_CASE("commit loop: changes that could not be stored are neither published n
   owner.ask(3);
   REQUIRE(eventually([&] { return owner.replied(3, "done"); }));
   CHECK(owner.log.has("publish hand"));
+  CHECK(eventually([&] { return !owner.loop.failure(); }));
+}
+
+TEST_CASE("commit loop: after a change that leaves no room for another, none is accepted") {
+  Running owner({std::chrono::milliseconds(1), kNever, std::chrono::milliseconds(5)});
+  owner.disk.set(&Disk::reserve_used, true);
+  owner.change("hand", 1);
+  REQUIRE(eventually([&] { return owner.replied(1, "done"); }));
+  CHECK(owner.log.has("publish hand"));
+  REQUIRE(owner.loop.failure());
+  CHECK(owner.loop.failure()->message == "there is no room");
+  CHECK(owner.loop.flush(in_time()));
+
+  owner.disk.set(&Disk::reserve_used, false);
   CHECK(eventually([&] { return !owner.loop.failure(); }));
 }
 

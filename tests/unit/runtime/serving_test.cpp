@@ -81,6 +81,7 @@ class SlowStore final : public StateStore {
     disk_.write();
     return {};
   }
+  Result<void> make_room() override { return {}; }
 
  private:
   Disk& disk_;

@@ -360,6 +360,41 @@ TEST_CASE("a full disk loses nothing and storing continues once there is room") 
   CHECK(store->load()->frames.size() == static_cast<std::size_t>(kept) + 2);
 }
 
+TEST_CASE("a change for which there was room is saved on a disk that is full since") {
+  testing::SmallDisk disk(600);
+  if (!disk.mounted()) {
+    WARN("SKIPPED: " << disk.missing());
+    return;
+  }
+  const std::string file = state_file(disk.path(), 7, "arms");
+  REQUIRE(opened(file)->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  const auto store = opened(file);
+  REQUIRE(store->make_room());
+  REQUIRE(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}}));
+  REQUIRE(store->make_room());
+  disk.fill();
+  std::size_t kept = 0;
+  Result<void> room;
+  // What each of these leaves in the log would fill the disk many times.
+  for (int i = 0; i < 500; ++i) {
+    REQUIRE(outcome(store->save({1, {"hand"}, {{"hand", "", {}, 1}}, {}})) == "ok");
+    REQUIRE(outcome(store->make_room()) == "ok");
+  }
+  while (room && kept < 1000) {
+    const std::string id = "f" + std::to_string(kept);
+    REQUIRE(outcome(store->save({1, {id}, {{id, "", {}, 1}}, {}})) == "ok");
+    ++kept;
+    room = store->make_room();
+  }
+  REQUIRE_FALSE(room);
+  CHECK(room.error().code == Errc::kState);
+  CHECK_THAT(room.error().message, ContainsSubstring("state file '" + file + "'"));
+  CHECK_THAT(room.error().message, ContainsSubstring("has no room on its disk"));
+  disk.make_room();
+  CHECK(outcome(store->make_room()) == "ok");
+  CHECK(store->load()->frames.size() == kept + 1);
+}
+
 TEST_CASE("a state file that is removed or moved below its process takes no change") {
   const TemporaryDirectory directory;
   const std::string file = directory.path() + "/arms.sqlite";
