@@ -159,8 +159,7 @@ void add_errors(const CommonErrors& more, CommonErrors& sum) {
 }
 
 bool is_observed(const CommonError& common_error) {
-  return common_error.source.rfind(kObservedPrefix, 0) == 0 &&
-         !is_of_two_samples(common_error.source);
+  return is_made(common_error.source) && !is_of_two_samples(common_error.source);
 }
 
 Belief inverse(const Belief& X_AB) {

@@ -87,6 +87,8 @@ bool join_samples(const std::string& source, std::vector<CommonError>& errors) {
 
 }  // namespace
 
+bool is_made(std::string_view name) { return name.rfind(kObservedPrefix, 0) == 0; }
+
 std::string instant_source(std::string_view source, Time stamp) {
   return std::string(kObservedPrefix) + kAt + std::to_string(nanoseconds(stamp)) + kOf +
          shortened(source);
@@ -139,7 +141,7 @@ std::string as_merged(std::string_view of_one_instant) {
 }
 
 std::string_view said_source(std::string_view name) {
-  if (name.rfind(kObservedPrefix, 0) != 0) return {};
+  if (!is_made(name)) return {};
   const std::size_t of = name.find(kOf);
   return of == std::string_view::npos ? std::string_view() : name.substr(of + 1);
 }
@@ -149,7 +151,7 @@ bool is_of_one_instant(std::string_view name) {
 }
 
 bool is_source_itself(std::string_view name, std::string_view said) {
-  return name.rfind(kObservedPrefix, 0) != 0 && shortened(name) == said;
+  return !is_made(name) && shortened(name) == said;
 }
 
 bool has_instants(const std::vector<CommonError>& common_errors) {

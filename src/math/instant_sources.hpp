@@ -15,6 +15,10 @@
 // it how errors at one instant are that come from samples with different stamps.
 namespace tfdude {
 
+/// Whether the library made the name: an observation has left the error, or it comes from two
+/// samples. Nobody can declare such a source.
+[[nodiscard]] bool is_made(std::string_view name);
+
 /// The name of a source's error at an instant, the same for all observations of that instant.
 [[nodiscard]] std::string instant_source(std::string_view source, Time stamp);
 

@@ -148,8 +148,7 @@ void join_lasting_sources(std::vector<EdgeAtEnds>& path) {
 
 }  // namespace
 
-MeanVelocity mean_velocity(const std::vector<EdgeAtEnds>& edges, double seconds) {
-  std::vector<EdgeAtEnds> path = edges;
+MeanVelocity mean_velocity(std::vector<EdgeAtEnds> path, double seconds) {
   join_lasting_sources(path);
   Pose X0;
   Pose X1;

@@ -38,6 +38,6 @@ struct MeanVelocity {
 /// different samples of an edge may be related in any way (instant_sources.hpp). Parts that
 /// observations subtract are left out, which makes the covariance larger.
 /// @param seconds  Δt, positive
-[[nodiscard]] MeanVelocity mean_velocity(const std::vector<EdgeAtEnds>& path, double seconds);
+[[nodiscard]] MeanVelocity mean_velocity(std::vector<EdgeAtEnds> path, double seconds);
 
 }  // namespace tfdude

@@ -90,7 +90,7 @@ std::vector<ObservedInstants::Use> ObservedInstants::uses(
     if (!takes_part(edges[k])) continue;
     const bool lasts = !instant_of(plan_, path_, k);
     for (const CommonError& one : edges[k].X_PC.common_errors) {
-      if (one.source.rfind(kObservedPrefix, 0) == 0) continue;
+      if (is_made(one.source)) continue;
       auto use = std::find_if(all.begin(), all.end(),
                               [&](const Use& other) { return other.source == one.source; });
       if (use == all.end()) use = all.insert(use, {one.source});

@@ -72,22 +72,24 @@ Result<StampedTransform> Lookups::wait(std::string_view a, std::string_view b, c
       .get();
 }
 
-// As other calls, one that does not wait for data has Options::timeout to ask.
-Deadline Lookups::deadline_of(Milliseconds wait) const {
-  return wait > Milliseconds(0) ? Deadline(wait) : discovery_.call_deadline();
+// As other calls, one that does not wait for data asks once, and has Options::timeout for that.
+template <class... Callback>
+auto Lookups::begin(const std::string& a, const std::string& b, const Query& query,
+                    Milliseconds wait, Callback... callback) {
+  const bool waits = wait > Milliseconds(0);
+  return pending_.add({a, b, query, !waits}, waits ? Deadline(wait) : discovery_.call_deadline(),
+                      not_asked_yet(a, b), std::move(callback)...);
 }
 
 std::shared_ptr<void> Lookups::start(const std::string& a, const std::string& b, const Query& query,
                                      Milliseconds wait, PendingLookups::Callback callback) {
-  auto call = pending_.add({a, b, query, wait <= Milliseconds(0)}, deadline_of(wait),
-                           not_asked_yet(a, b), std::move(callback));
+  auto call = begin(a, b, query, wait, std::move(callback));
   return {nullptr, [call](void*) { call->close(); }};
 }
 
 std::future<Result<StampedTransform>> Lookups::start(const std::string& a, const std::string& b,
                                                      const Query& query, Milliseconds wait) {
-  return pending_.add({a, b, query, wait <= Milliseconds(0)}, deadline_of(wait),
-                      not_asked_yet(a, b));
+  return begin(a, b, query, wait);
 }
 
 }  // namespace tfdude

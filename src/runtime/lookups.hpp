@@ -100,7 +100,9 @@ class Lookups final : private LookupHost {
   void pushed() { pending_.pushed(); }
 
  private:
-  [[nodiscard]] Deadline deadline_of(Milliseconds wait) const;
+  template <class... Callback>
+  auto begin(const std::string& a, const std::string& b, const Query& query, Milliseconds wait,
+             Callback... callback);
 
   // LookupHost
   [[nodiscard]] Result<LookupInProgress> plan(const WantedLookup& wanted) override;

@@ -98,7 +98,7 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
   OneStateTask task(structure_.forest, {read_at(ends.begin), read_at(ends.end), read_at(middle)},
                     true);
   if (auto asked = requests_.run(task, deadline); !asked) return tl::unexpected(asked.error());
-  const std::vector<EdgeAtEnds> edges = edges_of(task);
+  std::vector<EdgeAtEnds> edges = edges_of(task);
   if (turns_too_far(task)) {
     return fail_about_frame(Errc::kInvalidInput,
                             "frame " + quote(b) + " turns by more than half a turn in " + quote(a) +
@@ -106,15 +106,17 @@ Result<Velocity> Velocities::velocity(const std::string& a, const std::string& b
                                 ", so that two poses do not tell how fast: ask over less time",
                             b);
   }
+  std::vector<std::string> unspecified;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    if (!edges[k].before.unspecified && !edges[k].after.unspecified) continue;
+    unspecified.push_back(task.planned(kBegin).edges[k].info.id);
+  }
   MeanVelocity mean =
-      mean_velocity(edges, std::chrono::duration<double>(ends.end - ends.begin).count());
+      mean_velocity(std::move(edges), std::chrono::duration<double>(ends.end - ends.begin).count());
   Velocity velocity{mean.linear, mean.angular, mean.covariance, ends.begin, ends.end, {}};
   velocity.basis.bound = mean.bound;
   velocity.basis.sources = std::move(mean.sources);
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    if (!edges[k].before.unspecified && !edges[k].after.unspecified) continue;
-    velocity.basis.unspecified.push_back(task.planned(kBegin).edges[k].info.id);
-  }
+  velocity.basis.unspecified = std::move(unspecified);
   velocity.covariance.set_complete(velocity.basis.unspecified.empty());
   return velocity;
 }

@@ -46,7 +46,7 @@ const std::vector<CommonError>& SourceInstants::met(const std::vector<CommonErro
                                                     FromSamples from) {
   if (!naming_) {
     for (const CommonError& one : common_errors) {
-      if (one.source.rfind(kObservedPrefix, 0) != 0) note(one.source, from);
+      if (!is_made(one.source)) note(one.source, from);
       if (const auto stamp = stamp_of(one.source)) {
         note(std::string(said_source(one.source)), {*stamp, *stamp});
       }
