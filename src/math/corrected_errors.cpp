@@ -232,13 +232,15 @@ std::vector<CorrectedError> errors_beside(const JointPrior& prior, const LinearP
 
 // The update of many columns, which all add. Sources that are not estimated leave six more.
 std::vector<CorrectedError> corrected_many(const JointPrior& prior, const LinearPath& linear,
-                                           const Loading& R, Eigen::Index before,
+                                           const Factor& S, const Loading& R, Eigen::Index before,
                                            const std::string& new_source) {
   const std::size_t count = prior.edges().size();
+  // In the directions of S only.
+  const Matrix6d seen = S.rank() < 6 ? Matrix6d(S.root() * S.whitening()) : Matrix6d::Identity();
   std::vector<Matrix6d> H;
-  for (const std::size_t k : prior.edges()) H.push_back(linear.H[k]);
+  for (const std::size_t k : prior.edges()) H.emplace_back(seen * linear.H[k]);
   const Twist rounding = rounding_of_pose(linear.reach);
-  const Loading noise = compressed(joined(R, Matrix6d(rounding.asDiagonal())));
+  const Loading noise = compressed(seen * joined(R, Matrix6d(rounding.asDiagonal())));
   MeasuredJoint found = measured_joint(prior.own_roots(), left_columns(prior, before), H, noise);
   std::vector<CorrectedError> corrected;
   for (const Matrix6d& own : found.own) corrected.push_back({own, {}});
@@ -247,7 +249,6 @@ std::vector<CorrectedError> corrected_many(const JointPrior& prior, const Linear
   Left left{JointCovariance(count), {}};
   const bool others = !std::all_of(prior.sources().begin(), prior.sources().end(), is_left);
   if (others) {
-    const Factor S(joined(prior.path(linear.H), R), rounding);
     const auto with_path = prior.with_path(linear.H, S.whitening());
     const auto root = found.seen.topRows<6>();
     Matrix more(found.F.rows(), root.cols());
@@ -310,16 +311,17 @@ std::vector<CorrectedError> determined_many(const JointPrior& prior, const Linea
 
 }  // namespace
 
-std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const LinearPath& linear,
+std::vector<CorrectedError> corrected_errors(const JointPrior& prior, const PathMinimum& found,
                                              const Loading& R, const std::string& new_source,
                                              bool merge) {
   const auto& edges = prior.edges();
+  const LinearPath& linear = found.linear;
+  const Factor& S = found.S;
   const auto& H = linear.H;
   const bool alone = edges.size() == 1;
   const Eigen::Index many = merge && !alone ? many_left_columns(prior) : 0;
-  if (many > 0) return corrected_many(prior, linear, R, many, new_source);
+  if (many > 0) return corrected_many(prior, linear, S, R, many, new_source);
   const Twist rounding = rounding_of_pose(linear.reach);
-  const Factor S(joined(prior.path(H), R), rounding);
   const auto with_path = prior.with_path(H, S.whitening());
   std::vector<Matrix6d> gains;
   std::vector<CorrectedError> corrected;

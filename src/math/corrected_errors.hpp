@@ -27,10 +27,11 @@ struct CorrectedError {
 /// If one edge makes nearly all of the path's error, and the measurement is a hundred thousand
 /// times as precise, that difference would lose its digits. This edge is then tied to the others as
 /// in determined_errors(), with its gain instead of G.
+/// @param found  with this prior and R
 /// @param R  a root of the measurement's covariance
 /// @param merge  false: other edges depend on the sources of earlier observations, which are kept
 [[nodiscard]] std::vector<CorrectedError> corrected_errors(const JointPrior& prior,
-                                                           const LinearPath& linear,
+                                                           const PathMinimum& found,
                                                            const Loading& R,
                                                            const std::string& source, bool merge);
 

@@ -114,6 +114,36 @@ Loading JointPrior::path(const std::vector<Matrix6d>& H) const {
   return root_of_difference(adds, subtracts);
 }
 
+Twist JointPrior::size_on_path(const std::vector<Matrix6d>& H) const {
+  Twist sum = own_on_path(H).rowwise().squaredNorm();
+  for (const Source& source : sources_) {
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const Matrix6d& H_i = H[edges_[i]];
+      if (!H_i.isZero(0)) sum += (H_i * source.loadings[i]).rowwise().squaredNorm();
+    }
+  }
+  return sum.cwiseSqrt();
+}
+
+Twist JointPrior::least_on_path(const std::vector<Matrix6d>& H, bool of_all) const {
+  // Of a deviation. Variances, whose digits are half as many, must tell it from rounding.
+  constexpr double kLeast = 3e-8;
+  Twist sum = Twist::Zero();
+  Twist most = Twist::Zero();
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const Matrix6d& H_i = H[edges_[i]];
+    if (H_i.isZero(0)) continue;
+    Twist one = (H_i * own_roots_[i]).rowwise().squaredNorm();
+    for (const Source& source : sources_) {
+      one += (H_i * source.loadings[i]).rowwise().squaredNorm();
+    }
+    sum += one;
+    most = most.cwiseMax(one);
+  }
+  if (!of_all) sum -= most;
+  return kLeast * sum.cwiseMax(0.0).cwiseSqrt();
+}
+
 std::vector<Loading> JointPrior::with_path(const std::vector<Matrix6d>& H,
                                            const Whitening& W) const {
   std::vector<Loading> with_path;

@@ -70,6 +70,12 @@ class JointPrior {
   [[nodiscard]] Loading path(const std::vector<Matrix6d>& H) const;
   /// A root of Σ H_i own_i H_iᵀ, with all columns.
   [[nodiscard]] Loading own_on_path(const std::vector<Matrix6d>& H) const;
+  /// The standard deviations that the path would have if nothing in P cancelled.
+  [[nodiscard]] Twist size_on_path(const std::vector<Matrix6d>& H) const;
+  /// Standard deviations that a measurement must leave of the path's error, where the errors of
+  /// edges cancel, so that it is not lost in their rounding.
+  /// @param of_all  false: one edge takes the whole error of others, and nothing of its own cancels
+  [[nodiscard]] Twist least_on_path(const std::vector<Matrix6d>& H, bool of_all) const;
   /// P Hᵀ Wᵀ by edge. What is whitened keeps its digits over long levers.
   [[nodiscard]] std::vector<Loading> with_path(const std::vector<Matrix6d>& H,
                                                const Whitening& W) const;

@@ -33,6 +33,13 @@ Covariance unknown_seen(const Matrix6d& H, const Belief& edge) {
   return seen(H, with_bounded_rotations(edge.unknown->matrix()));
 }
 
+// A root of the covariance of a measurement, with at least these deviations.
+Loading not_exact(const Loading& root, const Twist& least) {
+  constexpr double kClear = 1e3;
+  if (Factor(root, kClear * least).rank() == 6) return root;
+  return compressed(joined(root, Matrix6d(least.asDiagonal())));
+}
+
 void forget(const CorrectedError& error, ObservedResult& result) {
   result.forgotten = error.forgotten;
   if (error.depends) result.X_PC.unknown = std::exchange(result.X_PC.own, {});
@@ -56,6 +63,7 @@ class Update {
   Result<Observation> run() {
     if (unknown_rotations_ > 0) turn_to(at_start().X_AB);
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
+    root_ = not_exact(root_, prior_.least_on_path(at_start().H, false));
     // Parts that may be correlated are judged by their bound.
     PathMinimum found = first_minimum();
     for (int i = 1; i < kMostTurns && turns(found); ++i) {
@@ -218,7 +226,7 @@ class Update {
 
   void apply(const PathMinimum& found, const BoundWeights& weights, Observation& observation) {
     prior_.widen(weights.of_A);
-    auto corrected = corrected_errors(prior_, found.linear, noise(weights), source_, merge_);
+    auto corrected = corrected_errors(prior_, found, noise(weights), source_, merge_);
     for (std::size_t i = 0; i < prior_.edges().size(); ++i) {
       const std::size_t k = prior_.edges()[i];
       ObservedResult& result = observation.edges[k];
@@ -294,8 +302,9 @@ class Unspecified {
  private:
   void correlate(const JointPrior& others, const LinearPath& linear, const std::string& source,
                  Observation& found) const {
-    const auto determined = determined_errors(
-        others, index_, linear, root_of(Z_AB_.covariance.of_specified().matrix()), source, merge_);
+    const Loading root = not_exact(root_of(Z_AB_.covariance.of_specified().matrix()),
+                                   others.least_on_path(linear.H, true));
+    const auto determined = determined_errors(others, index_, linear, root, source, merge_);
     const auto put = [&](std::size_t k, const CorrectedError& error) {
       found.edges[k].X_PC.own = Covariance::trusted(nearest_semidefinite(error.own));
       found.edges[k].X_PC.common_errors = error.common_errors;

@@ -43,6 +43,39 @@ Deviations between(const Deviations& from, const Deviations& to, double share) {
   return at;
 }
 
+// Tells rounding from an error of a path whose covariance is a difference of large ones.
+class Remainder {
+ public:
+  Remainder(const JointPrior& prior, const std::vector<Matrix6d>& H)
+      : prior_(prior), H_(H), size_(prior.size_on_path(H)) {}
+
+  /// How much of the path's error may be rounding [m, rad].
+  [[nodiscard]] Twist within() const { return size_ / kDeep; }
+  /// @param w  the direction, as a row by which the path's error there has a variance of one
+  [[nodiscard]] bool is_rounding(const Eigen::Matrix<double, 1, 6>& w) const {
+    const double cancelled = w.transpose().cwiseProduct(size_).norm();
+    if (!(cancelled > kDeep)) return false;
+    // What remains of a real error of the path is a small part of the edges' errors, and tells of
+    // an edge no more than such a part. Rounding is correlated with all of them by chance.
+    const auto with_path = prior_.with_path(H_, Whitening(w));
+    for (std::size_t i = 0; i < with_path.size(); ++i) {
+      const Twist told = with_path[i].col(0).cwiseAbs();
+      const Twist most = kMostTold * prior_.deviations(i);
+      if ((cancelled * told.array() > most.array()).any()) return true;
+    }
+    return false;
+  }
+
+ private:
+  // If less cancels, what rounding changes is below a hundredth of a variance.
+  static constexpr double kDeep = 1e5;
+  static constexpr double kMostTold = 3;
+
+  const JointPrior& prior_;
+  const std::vector<Matrix6d>& H_;
+  const Twist size_;
+};
+
 class Descent {
  public:
   Descent(const std::vector<ObservedEdge>& edges, const JointPrior& prior, const Pose& Z_AB,
@@ -123,8 +156,7 @@ class Descent {
   [[nodiscard]] PathMinimum here() const {
     Twist seen = -linear_.h;
     for (const std::size_t k : prior_.edges()) seen += linear_.H[k] * at_.xi[k];
-    Factor S(joined(prior_.path(linear_.H), noise_), rounding_of_pose(linear_.reach));
-    return {at_.xi, linear_, std::move(S), seen, false};
+    return {at_.xi, linear_, measured(prior_, linear_, noise_), seen, false};
   }
 
   [[nodiscard]] double cost(const EdgeErrors& errors, const Twist& h) const {
@@ -227,6 +259,28 @@ LinearPath linearize(const std::vector<ObservedEdge>& edges, const std::vector<T
   const Matrix6d outer = inverse_of(right_jacobian(linear.h));
   for (Matrix6d& H : linear.H) H = (outer * H).eval();
   return linear;
+}
+
+Factor measured(const JointPrior& prior, const LinearPath& linear, const Loading& R) {
+  Loading all = joined(prior.path(linear.H), R);
+  Twist rounding = rounding_of_pose(linear.reach);
+  if (!prior.is_tied()) return Factor(all, rounding);
+  const Remainder remainder(prior, linear.H);
+  // First by axis: beside rounding alone, scaled to one, other axes would seem correlated with it.
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    const double deviation = all.row(axis).norm();
+    if (deviation == 0) continue;
+    if (!remainder.is_rounding(Twist::Unit(axis).transpose() / deviation)) continue;
+    all.row(axis).setZero();
+    rounding[axis] = 0;
+  }
+  Factor S(all, rounding);
+  std::vector<bool> hidden;
+  for (Eigen::Index k = 0; k < S.root().cols(); ++k) {
+    hidden.push_back(remainder.is_rounding(S.whitening().row(k)));
+  }
+  S.leave_out(hidden, remainder.within());
+  return S;
 }
 
 PathMinimum minimize(const std::vector<ObservedEdge>& edges, const JointPrior& prior,

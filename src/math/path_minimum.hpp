@@ -34,6 +34,12 @@ struct PathMinimum {
   }
 };
 
+/// H P Hᵀ + R, without what is only rounding of P: earlier measurements may have left nothing of
+/// the path's error in a direction, as exact ones do. What remains there by rounding would tell of
+/// edges whose errors are much larger.
+/// @param H, R  as of a path and its measurement; R is a root
+[[nodiscard]] Factor measured(const JointPrior& prior, const LinearPath& linear, const Loading& R);
+
 /// Gauss-Newton on the manifold (an iterated Kalman update), with shorter steps where a whole one
 /// would increase the cost. If it does not converge, all is that of ξ = 0.
 /// @param R  a root of the measurement's covariance

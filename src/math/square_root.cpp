@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <Eigen/QR>
@@ -127,14 +128,32 @@ Factor::Factor(const Loading& A, const Twist& rounding) {
   }
 }
 
+void Factor::leave_out(const std::vector<bool>& hidden, const Twist& within) {
+  Loading root(6, 0);
+  Whitening whitening(0, 6);
+  for (Eigen::Index k = 0; k < root_.cols(); ++k) {
+    if (hidden[static_cast<std::size_t>(k)]) {
+      exact_ = joined(exact_, Loading(unit_.cwiseProduct(root_.col(k)).normalized()));
+      continue;
+    }
+    root = joined(root, Loading(root_.col(k)));
+    whitening.conservativeResize(root.cols(), Eigen::NoChange);
+    whitening.bottomRows<1>() = whitening_.row(k);
+  }
+  root_ = std::move(root);
+  whitening_ = std::move(whitening);
+  within_ = within;
+}
+
 double Factor::distance_squared(const Twist& x) const { return (whitening_ * x).squaredNorm(); }
 
 bool Factor::can_cause(const Twist& difference, const Twist& tolerance) const {
   constexpr double kCovarianceRounding = 1e-6;
+  const Twist most = tolerance + within_;
   const Twist scaled = unit_.cwiseProduct(difference);
-  const Twist allowed = unit_.cwiseProduct(tolerance);
+  const Twist allowed = unit_.cwiseProduct(most);
   for (int axis = 0; axis < 6; ++axis) {
-    if (unit_[axis] == 0 && std::abs(difference[axis]) > tolerance[axis]) return false;
+    if (unit_[axis] == 0 && std::abs(difference[axis]) > most[axis]) return false;
   }
   for (const auto& direction : exact_.colwise()) {
     const double left = std::abs(direction.dot(scaled));

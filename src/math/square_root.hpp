@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <vector>
 
 #include "tfdude/math/belief.hpp"
 
@@ -47,6 +48,10 @@ class Factor {
   [[nodiscard]] int rank() const { return static_cast<int>(root_.cols()); }
   /// xᵀ S⁺ x.
   [[nodiscard]] double distance_squared(const Twist& x) const;
+  /// Leaves out such directions, too, as those that are known exactly.
+  /// @param hidden  by column of the root
+  /// @param within  how much may remain in them, in addition to can_cause() [m, rad]
+  void leave_out(const std::vector<bool>& hidden, const Twist& within);
   /// Whether errors with this covariance can cause the difference. In directions that are known
   /// exactly nothing may remain but a millionth of the difference (as covariances may be rounded to
   /// float32), and `tolerance`.
@@ -57,6 +62,7 @@ class Factor {
   Whitening whitening_;
   Loading exact_;  // the other directions, in scaled units
   Twist unit_;
+  Twist within_ = Twist::Zero();  // of those that were left out
 };
 
 /// A root of the covariance after a measurement, L Lᵀ - L Aᵀ S⁺ A Lᵀ with A = H L and S = A Aᵀ + R
