@@ -119,6 +119,12 @@ Result<void> check_partition_name(std::string_view name) {
 }
 
 Result<void> check_new_partition_name(std::string_view name) {
+  // DDS passes names of at most 255 bytes on, and other words stand before this one.
+  constexpr std::size_t kMostBytes = 200;
+  if (name.size() > kMostBytes) {
+    return fail(Errc::kInvalidInput, "partition " + quote(name) + " has a name of more than " +
+                                         std::to_string(kMostBytes) + " bytes");
+  }
   return check_partition_name(name).and_then([&] { return check_new_id(name, "partition"); });
 }
 

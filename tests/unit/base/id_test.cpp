@@ -123,6 +123,8 @@ TEST_CASE("a new id does not look like another one") {
   CHECK(check_new_partition_name("left arm"));
   CHECK_FALSE(check_new_partition_name("arm "));
   CHECK_FALSE(check_new_partition_name("arm*"));
+  CHECK(check_new_partition_name(std::string(200, 'a')));
+  CHECK_FALSE(check_new_partition_name(std::string(201, 'a')));
 }
 
 TEST_CASE("a partition name is an id") {
