@@ -7,6 +7,7 @@
 
 #include "tfdude/base/id.hpp"
 
+#include "base/log.hpp"
 #include "partition/incarnation.hpp"
 #include "partition/joints.hpp"
 #include "store/correlation_blob.hpp"
@@ -138,6 +139,10 @@ Result<void> SqliteStore::open(const std::string& partition) {
   partition_ = partition;
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(file_).parent_path(), error);
+  std::error_code none;
+  if (std::filesystem::file_size(file_, none) == 0 && !none) {
+    log().warn("state file {} is empty: the partition starts from its configuration", quote(file_));
+  }
   auto opened = error ? fail(Errc::kState, error.message()) : Database::open(file_);
   if (!opened) return unusable("cannot be opened: " + opened.error().message);
   database_ = std::move(*opened);
