@@ -32,7 +32,7 @@ class ReplayedPartition {
   /// The joints as they are now in the recording.
   void show(std::vector<JointInfo> joints) { node_.show_joints(std::move(joints)); }
   /// The time of the recording is set back.
-  [[nodiscard]] Result<void> set_time(Time now) { return node_.set_time(now); }
+  [[nodiscard]] Result<void> set_time(Time now) { return node_.set_time(external_time(now)); }
   /// Values that the rules rejected, such as late samples.
   [[nodiscard]] std::size_t rejected() const { return rejected_; }
 

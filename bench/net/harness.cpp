@@ -64,7 +64,8 @@ tfdude::Transform await_lookup(tfdude::Client& client, const std::string& a, con
   const auto deadline = Clock::now() + std::chrono::seconds(30);
   while (true) {
     auto X = client.lookup(a, b);
-    if (X || Clock::now() > deadline) return must(std::move(X), "waiting for the frames");
+    if (X || Clock::now() > deadline)
+      return must(std::move(X), "waiting for the frames").transform();
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
 }

@@ -79,7 +79,7 @@ class Latency final : public bench::AppliedListener {
     Node* node = node_;
     if (node == nullptr) return;
     const Handle first = what == bench::Streamed::kEdges ? edge_ : carriage_;
-    const Transform seen = must(node->lookup(root_, first), "a lookup");
+    const StampedTransform seen = must(node->lookup(root_, first), "a lookup");
     const double latency = 1e6 * (shared_clock() - seen.pose.translation().x());
     const std::uint64_t count = state_.latency_count.load();
     if (count < bench::kMostLatencies) state_.latencies[count] = latency;

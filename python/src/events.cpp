@@ -101,6 +101,17 @@ void bind_observing(ClientClass& cls) {
       py::arg("gate") = 0.999, py::arg("independent") = true,
       "As observe(), for the edge from a frame's parent to the frame.");
   cls.def(
+      "determine",
+      [](const Session& session, const std::string& id, const std::string& a, const std::string& b,
+         const Transform& X_AB, py::handle stamp) {
+        const std::optional<Time> time = to_stamp(stamp, "stamp");
+        return value_of(session.call([&](Client& c) { return c.determine(id, a, b, X_AB, time); }));
+      },
+      py::arg("id"), py::arg("a"), py::arg("b"), py::arg("X_AB"), py::arg("stamp") = py::none(),
+      "Gives the edge of frame id the value by which the path from a to b is X_AB. The value\n"
+      "replaces the one before, and no other edge is corrected: for poses that a filter has\n"
+      "estimated from the same sensors as those before.");
+  cls.def(
       "consistency",
       [](const Session& session, const std::string& partition) {
         return value_of(session.call([&](Client& c) { return c.consistency(partition); }));
@@ -132,14 +143,14 @@ void bind_clock(ClientClass& cls) {
       "set_time",
       [](const Session& session, py::handle now) {
         const Time time = to_time(now, "now");
-        check(session.call([&](Client& c) { return c.set_time(time); }));
+        check(session.call([&](Client& c) { return c.set_time(external_time(time)); }));
       },
       py::arg("now"), "Sets the external clock of this client.");
   cls.def(
       "publish_clock",
       [](const Session& session, py::handle now) {
         const Time time = to_time(now, "now");
-        check(session.call([&](Client& c) { return c.publish_clock(time); }));
+        check(session.call([&](Client& c) { return c.publish_clock(external_time(time)); }));
       },
       py::arg("now"), "Sends the time to all participants with an external clock.");
   cls.def(

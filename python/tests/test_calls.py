@@ -283,6 +283,8 @@ def test_what_a_prompt_shows(network, car):
     assert "name='car'" in repr(car.partitions()[0]) and "samples=11" in repr(car.history("base")[0])
     assert repr(car.velocity("odom", "base")).startswith("Velocity(linear=array([")
     assert repr(FrameSpec("a", "b")).startswith("FrameSpec(id='a', parent='b', X_PC=Transform(")
+    assert repr(car) == "Node(partition='car', closed=False)"
+    assert repr(car.watch("odom", "base")).startswith("PathWatch(messages=")
     assert repr(tfdude.Joint("j")) == "Joint(name='j', type='revolute', position=0.0, variance=None)"
 
 

@@ -231,6 +231,19 @@ def test_observe(network):
             node.observe("head", "camera", Transform())
 
 
+def test_a_filters_pose_determines_an_edge(network):
+    frames = [FrameSpec("map"), FrameSpec("odom", "map"), FrameSpec("base", "odom", Transform.exact((2, 0, 0)))]
+    with tfdude.Node("robot", frames, network=network) as node:
+        for x in (5, 7):
+            pose = Transform((x, 0, 0), covariance=np.eye(6) * 0.01)
+            assert node.determine("odom", "map", "base", pose).accepted
+            there = node.lookup("map", "base")
+            assert np.allclose(there.translation, pose.translation) and np.allclose(there.covariance, pose.covariance)
+            assert np.allclose(node.lookup("odom", "base").translation, [2, 0, 0])
+        with pytest.raises(tfdude.InvalidArgumentException):
+            node.determine("map", "odom", "base", Transform.exact((2, 0, 0)))
+
+
 def test_changes_by_callback(client, node):
     seen = []
     with client.on_change(seen.append):

@@ -8,8 +8,10 @@ from . import _core
 
 # The properties that say most.
 _SHOWN: dict[type[Any], tuple[str, ...]] = {
+    _core.Client: ("closed",),
     _core.Config: ("partition", "frames"),
     _core.EdgeConsistency: ("id", "observations", "refused", "squares", "expected"),
+    _core.EdgesWatch: ("messages",),
     _core.Frame: ("id", "parent", "partition", "attached"),
     _core.FrameSpec: ("id", "parent", "X_PC", "joint"),
     _core.Geodetic: ("latitude", "longitude", "altitude"),
@@ -17,9 +19,12 @@ _SHOWN: dict[type[Any], tuple[str, ...]] = {
     _core.HistoryInfo: ("id", "samples", "oldest", "newest", "mean_gap", "max_gap"),
     _core.Joint: ("name", "type", "position", "variance"),
     _core.JointInfo: ("name", "frame", "position", "variance", "measured"),
+    _core.Node: ("partition", "closed"),
     _core.Observed: ("accepted", "distance_squared", "limit", "corrected", "stamp"),
     _core.PartitionInfo: ("name", "host", "pid", "frames", "reachable"),
+    _core.PathWatch: ("messages",),
     _core.PathSegment: ("partition", "start", "end"),
+    _core.Recording: ("instant",),
     _core.RecordingSummary: ("start", "end", "bytes", "finished", "problems"),
     _core.Utm: ("zone", "north", "easting", "northing", "altitude"),
     _core.Velocity: ("linear", "angular", "complete", "begin", "end"),

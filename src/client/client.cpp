@@ -223,26 +223,13 @@ Result<void> Client::hand_over(const std::string& id, const std::string& partiti
   return participant_->writes().hand_over(id, partition, parent, X_PC);
 }
 
-Result<Transform> Client::lookup(std::string_view a, std::string_view b) {
-  return participant_->lookups().lookup(a, b);
-}
-
-Result<Transform> Client::lookup(Handle a, Handle b) {
-  return participant_->lookups().lookup(a, b);
-}
-
-Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b,
-                                        const Query& query) {
-  return participant_->lookups().lookup(a, b, query);
+Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, const Query& query,
+                                        Milliseconds wait) {
+  return look_up(participant_->lookups(), a, b, query, wait);
 }
 
 Result<StampedTransform> Client::lookup(Handle a, Handle b, const Query& query) {
   return participant_->lookups().lookup(a, b, query);
-}
-
-Result<StampedTransform> Client::lookup(std::string_view a, std::string_view b, const Query& query,
-                                        Milliseconds wait) {
-  return participant_->lookups().wait(a, b, query, wait);
 }
 
 Result<StampedTransform> Client::lookup(std::string_view a, const Query& at_a, std::string_view b,
@@ -387,8 +374,12 @@ Result<void> Client::wait_until(Time time, Milliseconds wait) {
   return participant_->clock().wait_until(time, Deadline(wait));
 }
 
-Result<void> Client::set_time(Time now) { return participant_->set_time(now, true); }
-Result<void> Client::publish_clock(Time now) { return participant_->publish_clock(now); }
+Result<void> Client::set_time(ExternalTime now) {
+  return participant_->set_time(stamp_of(now), true);
+}
+Result<void> Client::publish_clock(ExternalTime now) {
+  return participant_->publish_clock(stamp_of(now));
+}
 Result<void> Client::advance_to(ExternalTime time, Milliseconds wait) {
   return participant_->advance_to(stamp_of(time), Deadline(wait));
 }

@@ -13,6 +13,7 @@
 #include "tfdude/base/time.hpp"
 #include "tfdude/math/observation.hpp"
 #include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/limits.hpp"
 #include "tfdude/types/version.hpp"
 
 #include "partition/handover_messages.hpp"
@@ -24,13 +25,6 @@ namespace tfdude {
 
 /// Identifies a participant: assigned by the transport, unique in a domain, new at every start.
 using PeerId = std::array<std::uint8_t, 12>;
-
-/// Maximum number of edges, subtrees, segments or entries per message.
-inline constexpr std::size_t kMaxItems = 4096;
-
-/// Maximum number of edges of one owner that are observed at once, or correlated with others on one
-/// path; also the maximum number of common errors of each.
-inline constexpr std::uint32_t kMaxCorrelated = kMaxCommonErrors;
 
 /// The latest Lamport time of a structure change known to a sender (Directory::next_lamport_time).
 /// Its own change gets a later one, whatever the owner's clock says, so that successive changes of

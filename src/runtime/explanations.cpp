@@ -18,8 +18,8 @@
 namespace tfdude {
 namespace {
 
-// How long owners are waited for: for people, who then learn which owner is silent.
-constexpr Milliseconds kPatienceForAnswer{80};
+// How long owners are waited for in all: for people, who then learn which owner is silent.
+constexpr Milliseconds kPatienceForAnswers{90};
 
 // The edges of a path at one instant.
 class PathEdgesTask final : public Task {
@@ -101,20 +101,20 @@ Explanation Explanations::why(const std::string& a, const std::string& b, const 
     return explanation;
   }
   const Deadline deadline = discovery_.call_deadline();
-  const Milliseconds left = deadline.left();
+  const bool complete = discovery_.complete();
+  const Deadline answers = complete ? deadline.within(kPatienceForAnswers) : deadline;
   // The rest is for what explains the answer.
-  const Deadline first = deadline.within(
-      discovery_.complete() ? std::min(kPatienceForAnswer, left / 2) : left / 4 * 3);
+  const Deadline first = answers.within(answers.left() / 3 * 2);
   Query lookup;
   lookup.at = query.at;
   Explanation explanation;
   auto found = lookups_.lookup<std::string_view>(a, b, lookup, first);
-  if (!found && found.error().code == Errc::kTimeout && !discovery_.complete()) {
+  if (!found && found.error().code == Errc::kTimeout && !complete) {
     // A program that has just joined hears last of partitions that are lost.
     found = lookups_.lookup<std::string_view>(a, b, lookup, deadline);
   }
   if (!found) {
-    explanation.cause = cause_of(std::move(found.error()), a, b, query, deadline);
+    explanation.cause = cause_of(std::move(found.error()), a, b, query, answers);
     return explanation;
   }
   explanation.X_AB = *std::move(found);
@@ -203,7 +203,7 @@ Explanations::Owners Explanations::owners_of(const std::vector<FrameInfo>& edges
     }
     parts.push_back({edge.owner, name, Request{0, edge.id, HistoryRequest{}}});
   }
-  const std::vector<Reply> replies = requests_.ask(parts, deadline.within(kPatienceForAnswer));
+  const std::vector<Reply> replies = requests_.ask(parts, deadline.within(kPatienceForAnswers));
   for (std::size_t i = 0; i < replies.size(); ++i) {
     const auto* error = std::get_if<Error>(&replies[i].body);
     if (error != nullptr && error->code == Errc::kTimeout && owners.silent.empty()) {
@@ -260,6 +260,9 @@ Cause Explanations::cause_of(Error error, const std::string& a, const std::strin
   explain_absent(*edges, cause);
   if (cause.obstacle != Obstacle::kOther) return cause;
   Owners owners = owners_of(*edges, deadline);
+  // One may have been lost while they were asked.
+  explain_absent(*edges, cause);
+  if (cause.obstacle != Obstacle::kOther) return cause;
   if (!owners.silent.empty()) {
     cause.obstacle = Obstacle::kOwnerSilent;
     cause.partition = owners.silent;
@@ -439,7 +442,7 @@ std::optional<std::chrono::nanoseconds> Explanations::clock_ahead(const std::str
   if (structure_.clock.kind() != ClockKind::kSystem) return std::nullopt;
   // Two, as the first one may be slow.
   const auto difference =
-      queries_.clock_difference(partition, deadline.within(kPatienceForAnswer), 2);
+      queries_.clock_difference(partition, deadline.within(kPatienceForAnswers), 2);
   const bool differs = difference && difference->exceeds(kClockDiffers);
   return differs ? std::optional(difference->ahead) : std::nullopt;
 }

@@ -36,19 +36,9 @@ class Lookups final : private LookupHost {
   // Each returns one object, so that no answer is copied. The clock is read only if others have to
   // be asked.
   template <class Name>
-  [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
-    auto X_AB = here([&](auto& from) { return from.lookup(a, b); });
-    if (!X_AB && !is_of_time(X_AB.error())) {
-      X_AB = elsewhere(a, b, {}, discovery_.call_deadline()).map([](const StampedTransform& X) {
-        return Transform{X.pose, X.covariance};
-      });
-    }
-    return X_AB;
-  }
-  template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
     auto X_AB = here([&](auto& from) { return from.lookup_pose(a, b); });
-    if (!X_AB) X_AB = lookup(a, b).map([](const Transform& found) { return found.pose; });
+    if (!X_AB) X_AB = lookup(a, b, {}).map([](const Transform& found) { return found.pose; });
     return X_AB;
   }
   template <class Name>

@@ -56,10 +56,6 @@ class MemoryReads {
 
   /// X_AB, if all edges are own or can be read; otherwise an error that says nothing.
   template <class Name>
-  [[nodiscard]] Result<Transform> lookup(Name a, Name b) {
-    return read(a, b, edges_, [&] { return structure_.forest.lookup(a, b, edges_); });
-  }
-  template <class Name>
   [[nodiscard]] Result<Pose> lookup_pose(Name a, Name b) {
     return read(a, b, edges_, [&] { return structure_.forest.lookup_pose(a, b, edges_); });
   }

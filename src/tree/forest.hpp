@@ -280,30 +280,24 @@ class Forest {
 
   // --- reading ---
 
-  /// X_AB at the newest instant for which all dynamic edges on the path have data. Does not
-  /// allocate on success; O(depth of both below their common ancestor).
+  /// X_AB at an instant, or at the newest one for which all dynamic edges on the path have data.
+  /// Does not allocate on success, if no edge is correlated or unspecified; O(depth of both below
+  /// their common ancestor).
   /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotOwner (an edge on the path is held
   ///   elsewhere: see segments()), kNotYet and kTooOld (an edge has no data for the instant; the
   ///   message names it and the gap).
-  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b) const;
-  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b) const;
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query = {}) const;
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query = {}) const;
 
-  /// As lookup(), without the covariance, in a fraction of the time.
+  /// As lookup() of the latest common time, without the covariance, in a fraction of the time.
   [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b) const;
   [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b) const;
-
-  /// X_AB at an instant.
-  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Query& query) const;
-  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query) const;
 
   /// As above, where others hold edges of the path that can be read in their memory. All edges of
   /// one owner are of one commit.
   /// @return an error without a text: kNotOwner, if an edge is not bound; see bind(). Others: the
   ///   owners have to be asked, as they have no data, cannot be read, or must say why not
-  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b,
-                                         const RemoteEdges& others) const;
-  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b, const RemoteEdges& others) const;
   [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b,
                                          const RemoteEdges& others) const;
   [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b, const RemoteEdges& others) const;

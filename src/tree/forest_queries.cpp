@@ -45,17 +45,11 @@ Result<void> for_each_edge(const Ends& ends, Visit visit) {
 
 }  // namespace
 
-Result<Transform> Forest::lookup(std::string_view a, std::string_view b) const {
-  return impl_->paths().look_up<Transform>(a, b);
-}
-Result<Transform> Forest::lookup(Handle a, Handle b) const {
-  return impl_->paths().look_up<Transform>(a, b);
-}
 Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b) const {
-  return impl_->paths().look_up<Pose>(a, b);
+  return impl_->paths().look_up_pose(a, b);
 }
 Result<Pose> Forest::lookup_pose(Handle a, Handle b) const {
-  return impl_->paths().look_up<Pose>(a, b);
+  return impl_->paths().look_up_pose(a, b);
 }
 Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b,
                                         const Query& query) const {

@@ -31,8 +31,8 @@ Result<void> PathLookup::reach_at(const Ends& ends, Absent absent, const Instant
   return tl::unexpected(explained(std::move(error), {ends}, query, clock_));
 }
 
-template <class Value, class Name>
-Result<void> PathLookup::compute(Name a, Name b, Value& X_AB) const {
+template <class Name>
+Result<void> PathLookup::compute(Name a, Name b, Pose& X_AB) const {
   const epoch::Guard guard;
   const auto found = frames_.ends(a, b);
   if (!found) return tl::unexpected(found.error());
@@ -52,12 +52,9 @@ Result<void> PathLookup::compute(Name a, Name b, const Query& query, StampedTran
 }
 
 // For a frame's id, and for its handle.
-template Result<void> PathLookup::compute(std::string_view a, std::string_view b,
-                                          Transform& X_AB) const;
 template Result<void> PathLookup::compute(std::string_view a, std::string_view b, Pose& X_AB) const;
 template Result<void> PathLookup::compute(std::string_view a, std::string_view b,
                                           const Query& query, StampedTransform& X_AB) const;
-template Result<void> PathLookup::compute(Handle a, Handle b, Transform& X_AB) const;
 template Result<void> PathLookup::compute(Handle a, Handle b, Pose& X_AB) const;
 template Result<void> PathLookup::compute(Handle a, Handle b, const Query& query,
                                           StampedTransform& X_AB) const;

@@ -48,11 +48,10 @@ class PathLookup {
   [[nodiscard]] static Result<void> reach_at(const Ends& ends, Absent absent, const Instant& at,
                                              const Query& query, Met& met, Output X_AB);
 
-  /// Value is Transform, or Pose if no covariance is needed; Name is an id or a handle. Takes its
-  /// own guard.
-  template <class Value, class Name>
-  [[nodiscard]] Result<Value> look_up(Name a, Name b) const {
-    return computed<Value>([&](Value& X_AB) { return compute(a, b, X_AB); });
+  /// Name is an id or a handle. Takes its own guard.
+  template <class Name>
+  [[nodiscard]] Result<Pose> look_up_pose(Name a, Name b) const {
+    return computed<Pose>([&](Pose& X_AB) { return compute(a, b, X_AB); });
   }
   template <class Name>
   [[nodiscard]] Result<StampedTransform> look_up(Name a, Name b, const Query& query) const {
@@ -69,8 +68,8 @@ class PathLookup {
     if (auto ok = compute(*X_AB); !ok) X_AB = tl::unexpected(std::move(ok.error()));
     return X_AB;
   }
-  template <class Value, class Name>
-  [[nodiscard]] Result<void> compute(Name a, Name b, Value& X_AB) const;
+  template <class Name>
+  [[nodiscard]] Result<void> compute(Name a, Name b, Pose& X_AB) const;
   template <class Name>
   [[nodiscard]] Result<void> compute(Name a, Name b, const Query& query,
                                      StampedTransform& X_AB) const;

@@ -193,29 +193,11 @@ Result<void> reach_at(const Ends& ends, PathLookup::Absent absent, const PathLoo
   return walked ? hand_over(std::move(whole), X_AB) : walked;
 }
 
-/// X_AB at the latest common time, as one transform.
-template <class Value, class Others>
-Result<void> compute_newest(const Ends& ends, Others& others, Value& X_AB) {
+/// X_AB at the latest common time.
+template <class Others>
+Result<void> compute_newest(const Ends& ends, Others& others, Pose& X_AB) {
   PathLookup::Met met;
-  auto newest = walk_newest(ends, PathLookup::Absent::kEnds, Order::kSecond, others, met, X_AB);
-  if constexpr (std::is_same_v<Value, Transform>) {
-    if (newest && met.correlated) {
-      met = {};
-      Belief whole;
-      newest = walk_newest(ends, PathLookup::Absent::kEnds, Order::kSecond, others, met, whole);
-      if constexpr (!Others::kNone) {
-        // A bound depends on the order in which edges are added up. A basis would tell.
-        if (newest && whole.unknown) return not_readable();
-      }
-      if (met.moving) join_instant(whole.common_errors, time_of(met.limiting->stamp));
-      if constexpr (!Others::kNone) {
-        auto errors = whole.common_errors;
-        if (newest && has_instants(errors) && allow_any_relation(errors)) return not_readable();
-      }
-      X_AB = collapse(whole);
-    }
-  }
-  return newest;
+  return walk_newest(ends, PathLookup::Absent::kEnds, Order::kSecond, others, met, X_AB);
 }
 
 /// What a query asks for.

@@ -25,12 +25,12 @@ Result<Value> computed(const RemoteEdges& others, Compute compute) {
   return X_AB;
 }
 
-template <class Value, class Name>
-Result<Value> newest(const Frames& frames, Name a, Name b, const RemoteEdges& others) {
+template <class Name>
+Result<Pose> newest(const Frames& frames, Name a, Name b, const RemoteEdges& others) {
   const epoch::Guard guard;
   const auto found = frames.ends(a, b);
   if (!found) return tl::unexpected(found.error());
-  return computed<Value>(others, [&](RemoteReading& reading, Value& X_AB) {
+  return computed<Pose>(others, [&](RemoteReading& reading, Pose& X_AB) {
     return compute_newest(*found, reading, X_AB);
   });
 }
@@ -86,19 +86,12 @@ std::size_t bound(const Frames& frames, Name a, Name b, RemoteEdges& others, boo
 
 }  // namespace
 
-Result<Transform> Forest::lookup(std::string_view a, std::string_view b,
-                                 const RemoteEdges& others) const {
-  return newest<Transform>(impl_->frames_, a, b, others);
-}
-Result<Transform> Forest::lookup(Handle a, Handle b, const RemoteEdges& others) const {
-  return newest<Transform>(impl_->frames_, a, b, others);
-}
 Result<Pose> Forest::lookup_pose(std::string_view a, std::string_view b,
                                  const RemoteEdges& others) const {
-  return newest<Pose>(impl_->frames_, a, b, others);
+  return newest(impl_->frames_, a, b, others);
 }
 Result<Pose> Forest::lookup_pose(Handle a, Handle b, const RemoteEdges& others) const {
-  return newest<Pose>(impl_->frames_, a, b, others);
+  return newest(impl_->frames_, a, b, others);
 }
 Result<StampedTransform> Forest::lookup(std::string_view a, std::string_view b, const Query& query,
                                         const RemoteEdges& others) const {

@@ -74,7 +74,7 @@ struct Simulation {
   // The time may be lost, so it is published until all have it.
   void tell(Time now) {
     REQUIRE(eventually([&] {
-      REQUIRE(publisher->publish_clock(now));
+      REQUIRE(publisher->publish_clock(external_time(now)));
       const auto has = [now](Client& one) { return one.now() == now; };
       return has(*base) && has(*tool) && has(*client);
     }));
@@ -101,13 +101,13 @@ TEST_CASE("clock: before the first time, whatever needs the present fails and sa
     CHECK_THAT(unstamped.error().message, ContainsSubstring("clock is external"));
     CHECK(outcome(caller->update("arm", along_x(1), ms(5))) == "not_yet");
   }
-  CHECK(outcome(base.set_time(ms(-1))) == "invalid_input");
-  CHECK(outcome(base.publish_clock(ms(-1))) == "invalid_input");
-  REQUIRE(base.set_time(ms(0)));
+  CHECK(outcome(base.set_time(external_time(ms(-1)))) == "invalid_input");
+  CHECK(outcome(base.publish_clock(external_time(ms(-1)))) == "invalid_input");
+  REQUIRE(base.set_time(external_time(ms(0))));
   CHECK(outcome(client.update("arm", along_x(1))) == "ok");
   CHECK(client.lookup("world", "arm", Query{}).value().stamp == ms(0));
   Client other = Client::open(join("")).value();
-  CHECK(outcome(other.set_time(ms(1))) == "invalid_input");
+  CHECK(outcome(other.set_time(external_time(ms(1)))) == "invalid_input");
   CHECK(outcome(other.now()) == "ok");
 }
 
@@ -170,7 +170,7 @@ TEST_CASE("clock: a participant that starts later has the next time") {
       Node::open(join("late"), "late", {{"camera", "hand", {}}}, dynamic(external())).value();
   // The time stands still, and is published again.
   CHECK(eventually([&] {
-    REQUIRE(sim.publisher->publish_clock(ms(5000)));
+    REQUIRE(sim.publisher->publish_clock(external_time(ms(5000))));
     return late.now() == ms(5000);
   }));
   REQUIRE(late.update("camera", along_x(2)));
@@ -182,9 +182,9 @@ TEST_CASE("clock: a joint has the position of its newest sample after a jump bac
   FrameSpec arm{"arm", "world", {}};
   arm.joint = testing::revolute_named("shoulder");
   Node node = Node::open(join("arm"), "arm", {{"world", "", {}}, arm}, dynamic(external())).value();
-  REQUIRE(node.set_time(ms(9000)));
+  REQUIRE(node.set_time(external_time(ms(9000))));
   REQUIRE(node.update_joints({"shoulder"}, {0.5}, {0}, ms(9000)));
-  REQUIRE(node.set_time(ms(0)));
+  REQUIRE(node.set_time(external_time(ms(0))));
   CHECK(outcome(node.lookup("world", "arm", Query{})) == "not_yet");
   for (const int t : {0, 10}) {
     REQUIRE(node.update_joints({"shoulder"}, {1 + 0.01 * t}, {0}, ms(t)));
@@ -218,7 +218,7 @@ TEST_CASE("clock: the present of one clock is not taken for that of another") {
       Node::open(join("sim"), "sim", {{"world", "", {}}, {"arm", "world", {}}}, dynamic(external()))
           .value();
   Client client = Client::open(join("")).value();
-  REQUIRE(sim.set_time(ms(5000)));
+  REQUIRE(sim.set_time(external_time(ms(5000))));
   for (const int t : {4000, 5000}) REQUIRE(sim.update("arm", along_x(t), ms(t)));
   // The clock comes with the presence, which may be later than the first page.
   REQUIRE(eventually([&] { return clock_of(client, "sim") == ClockKind::kExternal; }));

@@ -144,7 +144,7 @@ TEST_CASE("handover: what observations have found goes along") {
     Arms arms(joined_by(transport));
     Random random(77);
     const auto measure = [&](const char* a, const char* b) {
-      Transform X = arms.client->lookup(a, b).value();
+      Transform X = arms.client->lookup(a, b).value().transform();
       X.covariance = random.covariance();
       const auto seen = arms.client->observe(a, b, X);
       INFO(outcome(seen) << (seen ? "" : ": " + seen.error().message));
@@ -183,7 +183,7 @@ TEST_CASE("handover: an edge that drifts keeps its rows") {
       REQUIRE(first.update("odom", along_x(0.001 * static_cast<double>(t)), ms(t)));
     }
     const auto measure = [&](std::int64_t t) {
-      Transform X = client.lookup("map", "odom", query(t)).value();
+      Transform X = client.lookup("map", "odom", query(t)).value().transform();
       X.covariance = random.covariance();
       const auto seen = client.observe("map", "odom", X, ms(t));
       INFO(outcome(seen) << (seen ? "" : ": " + seen.error().message));

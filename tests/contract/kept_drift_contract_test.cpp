@@ -47,7 +47,7 @@ class Owner {
   [[nodiscard]] Transform lookup(const std::string& a, const std::string& b, int step) {
     Query query;
     query.at = at(step);
-    return node_->lookup(a, b, query).value();
+    return node_->lookup(a, b, query).value().transform();
   }
   [[nodiscard]] Node& node() { return *node_; }
   void restart() {

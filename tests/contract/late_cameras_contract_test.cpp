@@ -75,7 +75,7 @@ class Robot {
   [[nodiscard]] Transform estimate(const std::string& a, const std::string& b) {
     const auto X = node_->lookup(a, b, Query{});
     if (!X) FAIL(X.error().message);
-    return *X;
+    return X->transform();
   }
 
  private:

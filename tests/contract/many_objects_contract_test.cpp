@@ -100,7 +100,7 @@ class Robot {
     query.at = at(step_);
     const auto X = node_->lookup(a, b, query);
     REQUIRE(X);
-    return *X;
+    return X->transform();
   }
 
   LoopbackNetwork network_;

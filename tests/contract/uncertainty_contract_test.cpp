@@ -212,7 +212,7 @@ TEST_CASE("uncertainty: a measurement of a path over owners gives the fused cova
   CHECK(observed->dimensions == 6);
   CHECK(observed->corrected == std::vector<std::string>{"base", "arm", "hand", "tool"});
   // The path is the fusion of both estimates.
-  const auto fused = fuse({*before, Z});
+  const auto fused = fuse({before->transform(), Z});
   const auto after = robot.client->lookup("world", "tool", Query{});
   REQUIRE(fused);
   REQUIRE(after);
@@ -223,7 +223,7 @@ TEST_CASE("uncertainty: a measurement of a path over owners gives the fused cova
   const auto again = robot.arm->observe("tool", "world", inverse(Z));
   REQUIRE(again);
   const auto twice = robot.client->lookup("world", "tool");
-  const auto thrice_fused = fuse({*before, Z, Z});
+  const auto thrice_fused = fuse({before->transform(), Z, Z});
   REQUIRE(twice);
   REQUIRE(thrice_fused);
   CHECK(covariance_diff(twice->covariance, thrice_fused->X.covariance, 0.02) == "");
@@ -291,7 +291,7 @@ TEST_CASE("uncertainty: concurrent measurements of one path by two clients each 
   // A caller that finds the edge changed each time gives up, and has changed nothing.
   CHECK(mine + others > kEach);
   const std::vector<Transform> all(static_cast<std::size_t>(mine + others), Z);
-  std::vector<Transform> estimates = {*before};
+  std::vector<Transform> estimates = {before->transform()};
   estimates.insert(estimates.end(), all.begin(), all.end());
   const auto fused = fuse(estimates);
   const auto after = robot.client->lookup("world", "tool");

@@ -44,7 +44,7 @@ struct Robot {
     client.emplace(Client::open(join("")).value());
     for (const int at : {0, 100, 200}) REQUIRE(client->update({{"cart", edge()}}, ms(at)));
     // The arm and the hand are correlated with each other by this, and each with the source.
-    const Transform X_cart_hand = client->lookup("cart", "hand").value();
+    const Transform X_cart_hand = client->lookup("cart", "hand").value().transform();
     REQUIRE(client->observe("cart", "hand", {X_cart_hand.pose, random.covariance(0.001, 0.001)}));
     REQUIRE(client->correlate("base", {false, {common}, {}}));
     REQUIRE(client->correlate("cart", {false, {common}, {}}));

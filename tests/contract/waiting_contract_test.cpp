@@ -378,13 +378,13 @@ TEST_CASE("waiting: until a time of the client's clock") {
   auto node = Node::open(join("sim"), "sim", {{"world", "", {}}}, options);
   auto system = Client::open(join(""));
   REQUIRE((node && system));
-  REQUIRE(node->set_time(instant(0)));
+  REQUIRE(node->set_time(external_time(instant(0))));
   CHECK(node->wait_until(instant(0), 0ms));
   const auto early = node->wait_until(instant(10), 5ms);
   REQUIRE_FALSE(early);
   CHECK(early.error().code == Errc::kTimeout);
   CHECK(after([&] { return node->wait_until(instant(10), 20s); },
-              [&] { CHECK(node->set_time(instant(10))); }));
+              [&] { CHECK(node->set_time(external_time(instant(10)))); }));
   CHECK(system->wait_until(*system->now() + 10ms, 20s));
   CHECK_FALSE(system->wait_until(*system->now() + std::chrono::hours(1), 1ms));
 }

@@ -168,7 +168,7 @@ Injected inject(std::size_t kind, std::optional<Robot>& robot, const testing::Jo
       break;
     case 7: {  // another clock
       robot.emplace(join, random, "", Robot::owner_of(k));
-      REQUIRE(robot->nodes[Robot::owner_of(k)]->set_time(Time(std::chrono::seconds(10))));
+      REQUIRE(robot->nodes[Robot::owner_of(k)]->set_time(ExternalTime(std::chrono::seconds(10))));
       for (int other = 0; other < kOwners; ++other) {
         const Time stamp = other == k ? Time(std::chrono::seconds(5)) : instant(0);
         for (const int i : {1, 3}) {

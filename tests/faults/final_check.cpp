@@ -97,8 +97,8 @@ void check_values(const std::string& when, std::vector<Client>& clients, const W
         const std::string& parent = found->second.parent;
         const auto X_PC = client.lookup(parent, id);
         ++looked_up;
-        const std::string wrong =
-            X_PC ? worker->model().judge(parent, id, *X_PC, quiet) : X_PC.error().message;
+        const std::string wrong = X_PC ? worker->model().judge(parent, id, X_PC->transform(), quiet)
+                                       : X_PC.error().message;
         if (!wrong.empty()) journal.violation(when + ": " + wrong, model.history);
       }
       for (const auto& [id, base] : worker->joints()) {

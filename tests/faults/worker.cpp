@@ -234,7 +234,7 @@ void Worker::look_up() {
   const auto X_AB = client_.lookup(a, b);
   record("lookup", {b}, "in " + a + (X_AB ? " " + translation(*X_AB) : ""), X_AB);
   if (X_AB) {
-    const std::string difference = model_.judge(a, b, *X_AB, quiet());
+    const std::string difference = model_.judge(a, b, X_AB->transform(), quiet());
     if (!difference.empty()) contradiction(difference, b);
   } else if (denies(X_AB.error().code)) {
     const std::string difference = model_.judge(a, b, std::nullopt, quiet());

@@ -53,7 +53,7 @@ class Simulator {
       last = today;
       const std::int64_t jump = next_.exchange(-1);
       now_ = jump >= 0 ? jump : now_ + static_cast<std::int64_t>(passed * 1e9);
-      (void)client_.publish_clock(time_of(now_));
+      (void)client_.publish_clock(ExternalTime(std::chrono::nanoseconds(now_)));
       std::this_thread::sleep_for(5ms);
     }
   }

@@ -249,7 +249,7 @@ TEST_CASE(
     says(ends([&] { return client->update("base", testing::along_x(2)); }), kChangeTopic);
     says(ends([&] { return client->publish({{"base", testing::along_x(2)}}); }), kUpdateTopic);
     says(ends([&] { return client->publish_joints({"elbow"}, {0.5}); }), kJointTopic);
-    const auto clock = ends([&] { return client->publish_clock(Time(1s)); });
+    const auto clock = ends([&] { return client->publish_clock(ExternalTime(1s)); });
     REQUIRE_FALSE(clock);
     CHECK_THAT(clock.error().message, ContainsSubstring(kClockTopic));
     auto stream = client->stream({"base"}).value();
@@ -261,7 +261,7 @@ TEST_CASE(
   CHECK(testing::eventually([&] { return client->lookup("map", "tip").has_value(); }));
   CHECK(client->update("base", testing::along_x(2)));
   CHECK(client->publish({{"base", testing::along_x(3)}}));
-  CHECK(client->publish_clock(Time(1s)));
+  CHECK(client->publish_clock(ExternalTime(1s)));
   {
     const Failing failing([](const std::string&) { return true; });
     ends([&] { client.reset(); });

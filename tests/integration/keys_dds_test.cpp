@@ -125,12 +125,13 @@ TEST_CASE("keys in DDS: only who may publish the time is heard") {
   options.keys = keys.path("eye");
   Client eye = Client::open(options).value();
   const Time now = time_of(7);
-  const auto rejected = eye.publish_clock(now);
+  const auto rejected = eye.publish_clock(external_time(now));
   REQUIRE_FALSE(rejected);
   CHECK(rejected.error().code == Errc::kNotPermitted);
   options.keys = keys.path("clock");
   Client publisher = Client::open(options).value();
-  CHECK(eventually([&] { return publisher.publish_clock(now) && arm.now() == now; }));
+  CHECK(
+      eventually([&] { return publisher.publish_clock(external_time(now)) && arm.now() == now; }));
 }
 
 TEST_CASE("keys in DDS: participants that know the list do not match a revoked identity") {

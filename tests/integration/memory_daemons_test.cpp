@@ -127,7 +127,8 @@ TEST_CASE("memory: answers are those over DDS, and what was acknowledged is seen
     }
     if (written) {
       const auto parent = d.memory.parent(changed).value();
-      const auto seen = parent.empty() ? written : d.memory.lookup(parent, changed).value();
+      const auto seen =
+          parent.empty() ? written : d.memory.lookup(parent, changed).value().transform();
       CHECK(testing::pose_diff(seen->pose, written->pose, 1e-12) == "");
       if (with_common.count(changed) == 0) CHECK(transform_diff(*seen, *written, 1e-12) == "");
     }

@@ -343,7 +343,7 @@ TEST_CASE("ros robot: the clock of a simulator in tf-dude is that of ROS") {
   for (const std::int64_t ns : {5'000'000'000LL, 6'000'000'000LL, 1'000'000'000LL}) {
     const std::string text = std::to_string(ns);
     REQUIRE(eventually([&] {
-      REQUIRE(simulator.publish_clock(time_of(ns)));
+      REQUIRE(simulator.publish_clock(ExternalTime(std::chrono::nanoseconds(ns))));
       return peer.try_next("/clock ") == text;
     }));
     // While it stands still, it is sent again.

@@ -237,7 +237,7 @@ void Author::look_up(const std::string& a, const std::string& b, bool quiet) {
 void Author::judge(const std::string& a, const std::string& b, const Result<StampedTransform>& X_AB,
                    bool quiet, Instant began) {
   if (!X_AB && !(quiet && denies(X_AB.error().code))) return;
-  const std::optional<Transform> answer = X_AB ? std::optional<Transform>(*X_AB) : std::nullopt;
+  const std::optional<Transform> answer = X_AB ? std::optional(X_AB->transform()) : std::nullopt;
   faults::Model before;
   const bool lost = may_be_lost(began);
   if (lost) before = model_;

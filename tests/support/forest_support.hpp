@@ -21,7 +21,8 @@ template <class T>
 }
 
 /// The x of a lookup's answer; NaN, which equals nothing, on an error.
-[[nodiscard]] inline double x_of(const Result<Transform>& X) {
+template <class Answer>
+[[nodiscard]] double x_of(const Result<Answer>& X) {
   return X ? X->pose.translation().x() : std::numeric_limits<double>::quiet_NaN();
 }
 

@@ -39,7 +39,8 @@ namespace tfdude::testing {
 }
 
 /// The rotation about z [rad]; NaN if there is no value.
-[[nodiscard]] inline double yaw(const Result<Transform>& X) {
+template <class Answer>
+[[nodiscard]] double yaw(const Result<Answer>& X) {
   if (!X) return std::nan("");
   return 2 * std::atan2(X->pose.rotation().z(), X->pose.rotation().w());
 }

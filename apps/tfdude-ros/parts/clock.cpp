@@ -15,7 +15,7 @@ Result<void> ClockIn::start(RosDomain& domain, const IsNeighbour& is_own) {
 }
 
 void ClockIn::take(Time now) {
-  const auto sent = node_.publish_clock(now);
+  const auto sent = node_.publish_clock(external_time(now));
   if (sent || std::exchange(logged_, sent.error().message) == sent.error().message) return;
   spdlog::warn("/clock: {}", sent.error().message);
 }

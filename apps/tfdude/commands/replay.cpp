@@ -153,7 +153,7 @@ class Replay {
 
   [[nodiscard]] Result<void> publish_clock(Time now) {
     published_ = Steady::now();
-    return clock_.publish_clock(now);
+    return clock_.publish_clock(external_time(now));
   }
 
   void close(One& one) {

@@ -30,6 +30,10 @@ using ExternalTime = ExternalClock::time_point;
 
 /// As a stamp, which calls take of both clocks.
 [[nodiscard]] constexpr Time stamp_of(ExternalTime time) { return Time(time.time_since_epoch()); }
+/// A stamp that is of an external clock, as in a replay.
+[[nodiscard]] constexpr ExternalTime external_time(Time stamp) {
+  return ExternalTime(stamp.time_since_epoch());
+}
 
 /// The clock that a participant's stamps are of.
 enum class ClockKind : std::uint8_t {

@@ -30,6 +30,7 @@
 #include "tfdude/types/explanation.hpp"
 #include "tfdude/types/frame.hpp"
 #include "tfdude/types/joint_spec.hpp"
+#include "tfdude/types/limits.hpp"
 #include "tfdude/types/many.hpp"
 #include "tfdude/types/options.hpp"
 #include "tfdude/types/partition_info.hpp"
@@ -247,10 +248,10 @@ class TFDUDE_EXPORT Client {
                                        const PartialTransform& X_PC = {});
 
   /// X_AB, the pose of frame b in frame a, with the covariance of its right perturbation, expressed
-  /// in b. The instant is the newest for which all dynamic edges on the path have data. Covariance
-  /// is propagated to second order. Correlations are those that the owners state (Correlation);
-  /// other edges count as independent. If the covariance of an edge is unspecified, the answer's is
-  /// not complete (StatedCovariance); a lookup with a Query names such edges (Basis).
+  /// in b, at one instant for all partitions: that of the query, or the newest one for which all
+  /// dynamic edges on the path have data. Correlations are those that the owners state
+  /// (Correlation); other edges count as independent. If the covariance of an edge is unspecified,
+  /// the answer's is not complete (StatedCovariance), and its basis names the edge.
   ///
   /// A path of own edges of a Node uses no network, no lock and no allocation. Other paths take one
   /// round trip, however many partitions they cross, or two if the partitions have no common
@@ -258,29 +259,21 @@ class TFDUDE_EXPORT Client {
   /// common time: by up to two samples of the slowest edge, and 20 ms. Of answers of the owners,
   /// none is older than an earlier one. A handle is valid for this client only; other clients treat
   /// it as an unknown frame.
-  /// @return kUnknownStart, kUnknownEnd, kNotConnected, kNotYet, kTooOld (all edges have no instant
-  ///   in common).
-  [[nodiscard]] Result<Transform> lookup(std::string_view a, std::string_view b);
-  [[nodiscard]] Result<Transform> lookup(Handle a, Handle b);
+  /// @param wait  how long to wait for missing frames and data, whatever happens meanwhile;
+  ///   Milliseconds::max(): without a limit. Options::timeout then only bounds how long an owner is
+  ///   waited for before the request is repeated. Data that is older than the kept history is not
+  ///   waited for.
+  /// @return kUnknownStart, kUnknownEnd, kNotConnected; kNotYet, kTooOld (naming the edge without
+  ///   data for the instant, and the gap; or all edges have no instant in common); after a wait the
+  ///   last reason; kTimeout if there was no answer at all.
+  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
+                                                const Query& query = {}, Milliseconds wait = {});
+  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query = {});
 
-  /// As lookup(), without the covariance. On a path of own edges this takes a fraction of the time.
+  /// As lookup() of the latest common time, without the covariance. On a path of own edges this
+  /// takes a fraction of the time.
   [[nodiscard]] Result<Pose> lookup_pose(std::string_view a, std::string_view b);
   [[nodiscard]] Result<Pose> lookup_pose(Handle a, Handle b);
-
-  /// X_AB at one instant, the same for all partitions.
-  /// @return as above; kNotYet, kTooOld (naming the edge without data for the instant, and the
-  ///   gap).
-  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Query& query);
-  [[nodiscard]] Result<StampedTransform> lookup(Handle a, Handle b, const Query& query);
-
-  /// As above, but waits for missing frames and data. Takes at most `wait`, whatever happens
-  /// meanwhile; Options::timeout only bounds how long an owner is waited for before the request is
-  /// repeated. Milliseconds::max(): no limit. Fails at once if the data is older than the kept
-  /// history.
-  /// @return as above, with the last reason; kTimeout if there was no answer at all.
-  [[nodiscard]] Result<StampedTransform> lookup(std::string_view a, std::string_view b,
-                                                const Query& query, Milliseconds wait);
 
   /// Frame b at one instant seen from frame a at another, through a frame that is assumed fixed in
   /// between: X_AF(at_a) X_FB(at_b). A static edge on both ways has the same error twice, and
@@ -417,8 +410,7 @@ class TFDUDE_EXPORT Client {
   /// this time or later (clear_history()). Participants that watch these edges are told. Ownership,
   /// structure and static edges stay. Samples that were on their way then are rejected.
   /// @return kInvalidInput: a negative time; the client uses the system's clock.
-  [[nodiscard]] Result<void> set_time(Time now);
-  [[nodiscard]] Result<void> set_time(ExternalTime now) { return set_time(stamp_of(now)); }
+  [[nodiscard]] Result<void> set_time(ExternalTime now);
 
   /// Sends the time to all participants of the domain with an external clock, and sets that of this
   /// client, if it has one. Not acknowledged: a value may be lost. Participants that start later
@@ -426,10 +418,7 @@ class TFDUDE_EXPORT Client {
   /// takes some milliseconds, later calls do not wait. There should be one publisher: each time
   /// that is earlier than the one before clears histories.
   /// @return kInvalidInput: a negative time; kNotPermitted, kTransport.
-  [[nodiscard]] Result<void> publish_clock(Time now);
-  [[nodiscard]] Result<void> publish_clock(ExternalTime now) {
-    return publish_clock(stamp_of(now));
-  }
+  [[nodiscard]] Result<void> publish_clock(ExternalTime now);
 
   /// As publish_clock(), acknowledged: returns when the clocks of all reachable owners that have an
   /// external clock show the time, for simulations in lock-step. Others, and clients, are not

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <type_traits>
+
 #include "tfdude/base/export.hpp"
 #include "tfdude/math/pose.hpp"
 #include "tfdude/math/stated_covariance.hpp"
@@ -10,6 +12,15 @@ namespace tfdude {
 /// and the answer to a lookup. 28 doubles and a flag, trivially copyable; always valid, since its
 /// parts are.
 struct Transform {
+  Transform() = default;
+  Transform(const Pose& X_AB, const StatedCovariance& sigma) : pose(X_AB), covariance(sigma) {}
+  /// With an unspecified covariance.
+  explicit Transform(const Pose& X_AB) : pose(X_AB) {}
+  /// Of an answer, transform() leaves out the instant and the basis; no copy does so unasked.
+  template <class Answer, class = std::enable_if_t<!std::is_same_v<Answer, Transform> &&
+                                                   std::is_base_of_v<Transform, Answer>>>
+  Transform(const Answer& more) = delete;
+
   /// A pose that is known exactly.
   [[nodiscard]] static Transform exact(const Pose& X_AB) {
     return {X_AB, StatedCovariance::exact()};

@@ -65,6 +65,9 @@ struct Basis {
 struct StampedTransform : Transform {
   std::optional<Time> stamp;
   Basis basis{};
+
+  /// Without the instant and the basis.
+  [[nodiscard]] Transform transform() const { return {pose, covariance}; }
 };
 
 /// The interval of a velocity.

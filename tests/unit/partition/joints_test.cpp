@@ -61,7 +61,7 @@ struct Arm : Replica {
   void load() { REQUIRE(partition.load(frames(), kNow)); }
 
   Transform edge(const std::string& parent, const std::string& id) const {
-    return *forest.lookup(parent, id);
+    return forest.lookup(parent, id)->transform();
   }
   JointInfo info(const std::string& name) {
     const Reply reply = partition.answer(Request{1, "arm", JointsRequest{}}, kNow);

@@ -196,7 +196,7 @@ TEST_CASE("an entry of which only the id is known undoes nothing") {
   Partition partition("arms", 3, arms.forest, arms.directory);
   REQUIRE(partition.restore(state, {kArm, hand}, kNow));
   CHECK(arms.structure() == Lines{"hand <  @ arms", "tool < hand @ arms, attached"});
-  CHECK(x_of(arms.forest.kept("hand")->X_PC) == 20);
+  CHECK(arms.forest.kept("hand")->X_PC.pose.translation().x() == 20);
 }
 
 TEST_CASE("frames of others below a deleted entry stay and their owner reports them") {

@@ -42,11 +42,11 @@ TEST_CASE("lookups: each owner of a path is asked exactly once") {
   const ScriptedOwner base(network, "base", kBase);
   const ScriptedOwner arm(network, "arm", kArm);
   Seeker seeker(network);
-  CHECK(x_of(seeker.lookups.lookup<std::string_view>("world", "hand")) == 7);
+  CHECK(x_of(seeker.lookups.lookup<std::string_view>("world", "hand", {})) == 7);
   CHECK(base.asked() == 1);
   CHECK(arm.asked() == 1);
   // For edges of one owner only that owner is asked.
-  CHECK(x_of(seeker.lookups.lookup<std::string_view>("arm", "hand")) == 4);
+  CHECK(x_of(seeker.lookups.lookup<std::string_view>("arm", "hand", {})) == 4);
   CHECK(base.asked() == 1);
   const auto world = seeker.structure.forest.find("world");
   const auto hand = seeker.structure.forest.find("hand");

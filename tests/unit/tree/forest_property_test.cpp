@@ -163,7 +163,8 @@ class Duel {
     return actual == expected ? "" : actual + " instead of " + expected;
   }
 
-  bool same(const Result<Transform>& actual, const std::string& code,
+  template <class Answer>
+  bool same(const Result<Answer>& actual, const std::string& code,
             const NaiveTransform& expected) const {
     return outcome(actual) == code && (!actual || same_value(*actual, expected));
   }

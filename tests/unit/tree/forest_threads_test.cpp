@@ -68,7 +68,7 @@ struct ChainReader {
   int last = 0;
 
   // Commits are seen in their order, so k never falls.
-  void take(const Result<Transform>& X, int edges) {
+  void take(const Result<StampedTransform>& X, int edges) {
     const int k = X ? one_saying(*X, edges) : -1;
     if (!X) {
       finding.note("lookup failed: " + outcome(X));

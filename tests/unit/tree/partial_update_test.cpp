@@ -20,7 +20,7 @@ struct Arm {
     REQUIRE(forest.add("world", "", {}));
     REQUIRE(forest.add("arm", "world", before));
   }
-  Transform arm() const { return *forest.lookup("world", "arm"); }
+  Transform arm() const { return forest.lookup("world", "arm")->transform(); }
 
   Transform before;
   Transform given;

@@ -129,7 +129,7 @@ struct Seen {
   Seen seen;
   int last = 0;
   for (std::uint64_t n = 0; goes_on(n, lookups, seen.states); ++n) {
-    const auto X = chain.here.lookup(link_of(0), link_of(kLinks), chain.others);
+    const auto X = chain.here.lookup(link_of(0), link_of(kLinks), {}, chain.others);
     if (!X) {
       ++seen.given_up;
       continue;
@@ -280,7 +280,7 @@ struct Seen {
   });
   Seen seen;
   for (std::uint64_t n = 0; goes_on(n, lookups, seen.states); ++n) {
-    const auto X = here.lookup("p", "c", others);
+    const auto X = here.lookup("p", "c", {}, others);
     if (!X) {
       ++seen.given_up;
       if (here.bind("p", "c", others) > 0) ++seen.states;
