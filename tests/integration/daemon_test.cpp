@@ -36,7 +36,7 @@ TEST_CASE("daemon: wrong arguments and configurations are rejected and named") {
       {{"--nonsense"}, {"--nonsense"}},
       {{"--partition", "le*gs"}, {"le*gs", "'*'"}},
       {{"--partition", "legs\n"}, {"legs\\x0a", "control character"}},
-      {{"--partition", std::string(256, 'x')}, {"256 bytes"}},
+      {{"--partition", std::string(201, 'x')}, {"more than 200 bytes"}},
       {{"--partition", "legs", "--domain", "233"}, {"233", "232"}},
       {{"--partition", "legs", "--domain", "far"}, {"--domain", "far"}},
       {{"--partition", "legs", "--domain", ""}, {"--domain", "not a number"}},
