@@ -18,11 +18,14 @@ namespace {
 
 using testing::Random;
 using Way = ObservedEdge::Way;
-using Exact = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
 
 // base and object lie in the map, another object on the base.
 constexpr std::size_t kEdges = 3;
+constexpr std::size_t kRows = 6 * kEdges;
 using Path = std::array<Way, kEdges>;  // base, object, other
+using Row = std::array<long double, kRows>;
+using Joint = Eigen::Matrix<double, kRows, kRows>;
+using OfPath = Eigen::Matrix<double, 6, kRows>;
 constexpr std::array<Path, 3> kPaths{{{Way::kUp, Way::kDown, Way::kBeside},
                                       {Way::kDown, Way::kBeside, Way::kDown},
                                       {Way::kDown, Way::kUp, Way::kDown}}};
@@ -35,10 +38,11 @@ struct World {
       X.own = random.covariance(0.2, 0.1);
       edges.push_back({X, Way::kDown});
     }
-    P = Exact::Zero(6 * kEdges, 6 * kEdges);
-    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(kEdges); ++i) {
-      P.block(6 * i, 6 * i, 6, 6) =
-          edges[static_cast<std::size_t>(i)].X_PC.own.matrix().cast<long double>();
+    const Joint prior = claimed();
+    for (std::size_t i = 0; i < kRows; ++i) {
+      for (std::size_t j = 0; j < kRows; ++j) {
+        P[i][j] = prior(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
     }
   }
 
@@ -54,8 +58,8 @@ struct World {
   }
 
   // How an error of the path follows from those of the edges.
-  [[nodiscard]] Eigen::MatrixXd H(const Path& path, Pose& X_AB) const {
-    Eigen::MatrixXd found = Eigen::MatrixXd::Zero(6, 6 * kEdges);
+  [[nodiscard]] OfPath H(const Path& path, Pose& X_AB) const {
+    OfPath found = OfPath::Zero();
     const auto all = order(path);
     X_AB = Pose();
     for (auto i = all.rbegin(); i != all.rend(); ++i) {
@@ -69,23 +73,37 @@ struct World {
     return found;
   }
 
-  // The Kalman filter, axis by axis, where anything is left to be measured.
-  void measure(const Eigen::MatrixXd& H, const Twist& deviations) {
+  // The Kalman filter, axis by axis, where anything is left to be measured: P - P hᵀ h P / s.
+  void measure(const OfPath& H, const Twist& deviations) {
     for (Eigen::Index axis = 0; axis < 6; ++axis) {
-      const Exact h = H.row(axis).cast<long double>();
-      const long double r = static_cast<long double>(deviations[axis]) * deviations[axis];
-      const Exact Ph = P * h.transpose();
-      const long double s = (h * Ph)(0, 0) + r;
+      Row Ph{};
+      long double s = static_cast<long double>(deviations[axis]) * deviations[axis];
+      for (std::size_t i = 0; i < kRows; ++i) {
+        for (std::size_t j = 0; j < kRows; ++j) {
+          Ph[i] += P[i][j] * H(axis, static_cast<Eigen::Index>(j));
+        }
+        s += H(axis, static_cast<Eigen::Index>(i)) * Ph[i];
+      }
       if (s < 1e-16L) continue;
-      const Exact K = Ph / s;
-      const Exact rest = Exact::Identity(P.rows(), P.rows()) - K * h;
-      P = (rest * P * rest.transpose() + K * r * K.transpose()).eval();
+      for (std::size_t i = 0; i < kRows; ++i) {
+        for (std::size_t j = 0; j < kRows; ++j) P[i][j] -= Ph[i] * Ph[j] / s;
+      }
     }
+  }
+  [[nodiscard]] Joint filtered() const {
+    Joint all;
+    for (std::size_t i = 0; i < kRows; ++i) {
+      for (std::size_t j = 0; j < kRows; ++j) {
+        all(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+            static_cast<double>(P[i][j]);
+      }
+    }
+    return all;
   }
 
   // What the edges claim.
-  [[nodiscard]] Eigen::MatrixXd claimed() const {
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(6 * kEdges, 6 * kEdges);
+  [[nodiscard]] Joint claimed() const {
+    Joint sum = Joint::Zero();
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(kEdges); ++i) {
       const Belief& a = edges[static_cast<std::size_t>(i)].X_PC;
       sum.block<6, 6>(6 * i, 6 * i) += a.own.matrix();
@@ -105,15 +123,15 @@ struct World {
   }
 
   std::vector<ObservedEdge> edges;
-  Exact P;
+  std::array<Row, kRows> P{};
 };
 
 // What is exact is below a millionth of a metre and a radian, and the rest as it should be.
 void compare(const World& world, const Path& path) {
   Pose X_AB;
-  const Eigen::MatrixXd H = world.H(path, X_AB);
-  const Eigen::MatrixXd right = H * world.P.cast<double>() * H.transpose();
-  const Eigen::MatrixXd found = H * world.claimed() * H.transpose();
+  const OfPath H = world.H(path, X_AB);
+  const Matrix6d right = H * world.filtered() * H.transpose();
+  const Matrix6d found = H * world.claimed() * H.transpose();
   for (Eigen::Index i = 0; i < 6; ++i) {
     for (Eigen::Index j = 0; j < 6; ++j) {
       const double scale = std::sqrt(std::max(right(i, i), 0.0) * std::max(right(j, j), 0.0));
@@ -144,7 +162,7 @@ TEST_CASE("Measurements that are exact about some axes are those of a Kalman fil
       CAPTURE(k);
       const Path& path = kPaths[static_cast<std::size_t>(k) % kPaths.size()];
       Pose X_AB;
-      const Eigen::MatrixXd H = world.H(path, X_AB);
+      const OfPath H = world.H(path, X_AB);
       const auto order = world.order(path);
       std::vector<ObservedEdge> edges;
       for (const std::size_t i : order) edges.push_back({world.edges[i].X_PC, path[i]});
