@@ -114,14 +114,19 @@ Loading JointPrior::path(const std::vector<Matrix6d>& H) const {
   return root_of_difference(adds, subtracts);
 }
 
-Twist JointPrior::size_on_path(const std::vector<Matrix6d>& H) const {
-  Twist sum = own_on_path(H).rowwise().squaredNorm();
+Twist JointPrior::uncancelled(const std::vector<Matrix6d>& H, std::size_t i) const {
+  const Matrix6d& H_i = H[edges_[i]];
+  if (H_i.isZero(0)) return Twist::Zero();  // beside the path
+  Twist variances = (H_i * own_roots_[i]).rowwise().squaredNorm();
   for (const Source& source : sources_) {
-    for (std::size_t i = 0; i < edges_.size(); ++i) {
-      const Matrix6d& H_i = H[edges_[i]];
-      if (!H_i.isZero(0)) sum += (H_i * source.loadings[i]).rowwise().squaredNorm();
-    }
+    variances += (H_i * source.loadings[i]).rowwise().squaredNorm();
   }
+  return variances;
+}
+
+Twist JointPrior::size_on_path(const std::vector<Matrix6d>& H) const {
+  Twist sum = Twist::Zero();
+  for (std::size_t i = 0; i < edges_.size(); ++i) sum += uncancelled(H, i);
   return sum.cwiseSqrt();
 }
 
@@ -131,12 +136,7 @@ Twist JointPrior::least_on_path(const std::vector<Matrix6d>& H, bool of_all) con
   Twist sum = Twist::Zero();
   Twist most = Twist::Zero();
   for (std::size_t i = 0; i < edges_.size(); ++i) {
-    const Matrix6d& H_i = H[edges_[i]];
-    if (H_i.isZero(0)) continue;
-    Twist one = (H_i * own_roots_[i]).rowwise().squaredNorm();
-    for (const Source& source : sources_) {
-      one += (H_i * source.loadings[i]).rowwise().squaredNorm();
-    }
+    const Twist one = uncancelled(H, i);
     sum += one;
     most = most.cwiseMax(one);
   }

@@ -95,6 +95,9 @@ class JointPrior {
   void widen(double by);
 
  private:
+  // What an edge adds to the variances of the path's axes if nothing cancels.
+  [[nodiscard]] Twist uncancelled(const std::vector<Matrix6d>& H, std::size_t i) const;
+
   const std::vector<ObservedEdge>& all_;
   std::vector<std::size_t> edges_;
   std::vector<Matrix6d> own_;

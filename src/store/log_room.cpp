@@ -23,14 +23,13 @@ bool LogRoom::reserve() {
   if (size + kBytes <= reserved_) return true;
   const int file = ::open(log_.c_str(), O_WRONLY | O_CLOEXEC | O_NOFOLLOW);
   if (file < 0) return true;
-  bool done = false;
-  bool full = false;
-  for (const std::int64_t bytes : {2 * kBytes, kBytes}) {
-    if (done) continue;
-    done = ::fallocate(file, FALLOC_FL_KEEP_SIZE, size, bytes) == 0;
-    full = !done && (errno == ENOSPC || errno == EDQUOT || errno == EFBIG);
-    if (done) reserved_ = size + bytes;
-  }
+  const auto take = [&](std::int64_t bytes) {
+    if (::fallocate(file, FALLOC_FL_KEEP_SIZE, size, bytes) != 0) return false;
+    reserved_ = size + bytes;
+    return true;
+  };
+  const bool full =
+      !take(2 * kBytes) && !take(kBytes) && (errno == ENOSPC || errno == EDQUOT || errno == EFBIG);
   ::close(file);
   return !full;
 }
