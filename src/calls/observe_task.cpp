@@ -17,16 +17,30 @@ namespace tfdude {
 namespace {
 
 // How often to repeat an observation if edges were written meanwhile, or were observed with still
-// others.
-constexpr int kObserveAttempts = 8;
+// others. Of those who collide one succeeds each time, and the others wait a little longer each
+// time, as they may be many.
+constexpr int kObserveAttempts = 64;
+constexpr int kAtOnce = 3;
 
-// How often, and for how long, to wait for another observation to reach all owners.
-constexpr int kTornAttempts = 5;
-constexpr Milliseconds kTornPause{1};
-// One that has begun so long ago has reached all owners: an edge that lacks it was written since.
-constexpr Milliseconds kTornFor{50};
+// While another observation has not reached all owners, nothing is built on its part: it may be
+// taken back, and can't be if there is something newer. One that was computed so long ago has
+// reached them, or nobody will finish it. An edge that lacks it then was written since.
+constexpr Milliseconds kTornFor{400};
+// The same if such an edge was written before, as one that somebody updates again and again.
+constexpr Milliseconds kTornForRewritten{30};
+constexpr Milliseconds kLongestPause{8};
 
-// When an observation with that name has begun; absent: the name does not say it.
+bool has(const std::vector<std::string>& all, const std::string& one) {
+  return std::find(all.begin(), all.end(), one) != all.end();
+}
+
+// Before the next one of some attempts.
+Milliseconds pause_before(int attempt) {
+  return attempt < 1 ? Milliseconds(0)
+                     : std::min(Milliseconds(1 << std::min(attempt - 1, 8)), kLongestPause);
+}
+
+// When an observation with that name was computed; absent: the name does not say it.
 std::optional<Time> begin_of(const std::string& source) {
   std::int64_t ns = 0;
   const char* const from = source.c_str() + std::min(source.size(), kObservedPrefix.size());
@@ -34,6 +48,14 @@ std::optional<Time> begin_of(const std::string& source) {
   const auto read = std::from_chars(from, end, ns);
   if (read.ec != std::errc() || read.ptr == end || *read.ptr != '.') return std::nullopt;
   return time_of(ns);
+}
+
+// The name of an observation that is computed so much later than the name says.
+std::string later(const std::string& source, std::chrono::nanoseconds by) {
+  const auto begin = begin_of(source);
+  if (!begin) return source;
+  return std::string(kObservedPrefix) + std::to_string(nanoseconds(*begin + by)) +
+         source.substr(source.find('.', kObservedPrefix.size()));
 }
 
 // Whether a value differs by more than rounding, in units of its error.
@@ -56,13 +78,13 @@ bool has_changed(const Belief& before, const Belief& after) {
 }  // namespace
 
 ObserveTask::ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
-                         std::string source, std::vector<std::string> settled, bool asks_for_frames,
+                         std::string source, EarlierObservations earlier, bool asks_for_frames,
                          const TimeLimit& limit)
     : forest_(forest),
       measurement_(std::move(measurement)),
       determined_(std::move(determined)),
-      source_(std::move(source)),
-      settled_(std::move(settled)),
+      begin_(std::move(source)),
+      earlier_(std::move(earlier)),
       asks_for_frames_(asks_for_frames),
       limit_(limit) {}
 
@@ -121,10 +143,28 @@ bool ObserveTask::leave_out_silent(const std::vector<Reply>& replies) {
 // By the clocks of both observers. If they differ, it is waited for in vain, or not, and what it
 // has not corrected yet stays as it is (observe_beside_others()).
 bool ObserveTask::is_under_way(const std::string& source, Clock::time_point now) const {
-  if (std::count(settled_.begin(), settled_.end(), source) > 0) return false;
-  const auto own = begin_of(source_);
+  if (has(earlier_.settled, source)) return false;
+  const auto own = begin_of(begin_);
   const auto other = begin_of(source);
   return !own || !other || (*own - *other) + (now - *begun_) < kTornFor;
+}
+
+// Other owners will soon have what one owner has applied already, unless an edge was written since.
+bool ObserveTask::awaits_others(const ObservedPath& path, Clock::time_point now) {
+  const auto& sources = path.lacking_sources;
+  const bool any = std::any_of(sources.begin(), sources.end(),
+                               [&](const std::string& one) { return is_under_way(one, now); });
+  if (any && sources != awaited_) {
+    awaited_ = sources;
+    awaited_since_ = now;
+    waits_ = 0;
+  }
+  const bool all_rewritten =
+      std::all_of(path.lacking.begin(), path.lacking.end(),
+                  [&](const std::string& id) { return has(earlier_.rewritten, id); });
+  const bool waits = any && now - awaited_since_ < (all_rewritten ? kTornForRewritten : kTornFor);
+  if (!waits && !sources.empty() && sources == awaited_) rewritten_ = path.lacking;
+  return waits && !limit_.over(now);
 }
 
 // The values of all edges of the plan, at one instant.
@@ -190,29 +230,24 @@ Result<Task::Next> ObserveTask::observe(const ObservedPath& path, Clock::time_po
     beside_.insert(beside_.end(), missing.begin(), missing.end());
     return again();
   }
-  // Other owners will soon have what one owner has applied already, unless an edge was written
-  // since.
-  const auto& others = path.lacking_sources;
-  const bool torn = std::any_of(others.begin(), others.end(),
-                                [&](const std::string& one) { return is_under_way(one, now); });
-  if (torn && torn_ < kTornAttempts && !limit_.over(now)) {
-    pause_ = kTornPause * (1 << torn_++);
+  if (awaits_others(path, now)) {
+    pause_ = pause_before(++waits_);
     return Next::kPlan;
   }
   // What is left out may still be correlated with what is not, or will be in a moment.
   absent_.clear();
   std::copy_if(path.missing.begin(), path.missing.end(), std::back_inserter(absent_), exists);
-  const std::string source = this->source();
+  source_ = later(begin_, now - *begun_) + "." + std::to_string(attempts_);
   auto edges = edges_of(path);
   if (!edges) return tl::unexpected(std::move(edges.error()));
   if (measurement_.options.independent) {
     determine_forgotten(plan_, path, measurement_.X_AB, *edges);
   }
   loosen(plan_, *edges);
-  ObservedInstants instants(plan_, path, source);
+  ObservedInstants instants(plan_, path, source_);
   instants.name(*edges, !beside_others());
   auto found = (beside_others() ? observe_beside_others : tfdude::observe)(
-      *edges, measurement_.X_AB, source, measurement_.options);
+      *edges, measurement_.X_AB, source_, measurement_.options);
   if (found) {
     instants.settle(*found);
     return apply(path, *found);
@@ -307,8 +342,8 @@ Result<Task::Next> ObserveTask::taken_back(const std::vector<Reply>& replies) {
 }
 
 Result<Task::Next> ObserveTask::again() {
-  pause_ = Milliseconds(0);
-  if (++attempts_ < kObserveAttempts) return Next::kPlan;
+  pause_ = pause_before(++attempts_ - kAtOnce);
+  if (attempts_ < kObserveAttempts) return Next::kPlan;
   return fail(Errc::kChangedMeanwhile, "edges between " + quote(measurement_.a) + " and " +
                                            quote(measurement_.b) +
                                            " were written each time that they were observed");

@@ -18,6 +18,13 @@ struct Measurement {
   ObserveOptions options;
 };
 
+/// What a client knows from its earlier observations.
+struct EarlierObservations {
+  std::vector<std::string> settled;  ///< sources of those that all owners have applied
+  /// Edges that had a new value when others still had the error of their observation.
+  std::vector<std::string> rewritten;
+};
+
 /// Applies a measurement: asks for all edges of the path at one instant, computes their
 /// corrections, and sends each owner its share. If an edge has changed meanwhile, or its owner
 /// cannot be reached any more, it takes back what others have applied; after a change it does all
@@ -27,11 +34,9 @@ class ObserveTask final : public Task {
   /// @param determined  the frame whose edge takes all of it, whatever its value was; empty: none
   /// @param source  a name of the measurement's error that no other has that begins with
   ///   kObservedPrefix and when it has begun [ns], so that others know whether it is under way
-  /// @param settled  of the names of earlier ones, those that all owners have applied, as far as
-  ///   that is known
   /// @param asks_for_frames  the participant does not keep all frames
   ObserveTask(const Forest& forest, Measurement measurement, std::string determined,
-              std::string source, std::vector<std::string> settled, bool asks_for_frames,
+              std::string source, EarlierObservations earlier, bool asks_for_frames,
               const TimeLimit& limit);
 
   [[nodiscard]] std::vector<std::string> frames() const override;
@@ -47,7 +52,9 @@ class ObserveTask final : public Task {
   /// Once it is done.
   [[nodiscard]] Observed& observed() { return observed_; }
   /// The name of the measurement's error at the owners, once it is done.
-  [[nodiscard]] std::string source() const { return source_ + "." + std::to_string(attempts_); }
+  [[nodiscard]] const std::string& source() const { return source_; }
+  /// The edges that it has waited for in vain.
+  [[nodiscard]] const std::vector<std::string>& rewritten() const { return rewritten_; }
   /// Whether it could not wait for another observation, or correct all edges beside the path: the
   /// result is right, but less certain than both together allow (observe_beside_others()).
   [[nodiscard]] bool beside_others() const { return !absent_.empty() || !path_.lacking.empty(); }
@@ -64,6 +71,7 @@ class ObserveTask final : public Task {
 
   /// Whether another observation may not have reached all owners yet.
   [[nodiscard]] bool is_under_way(const std::string& source, Clock::time_point now) const;
+  [[nodiscard]] bool awaits_others(const ObservedPath& path, Clock::time_point now);
   [[nodiscard]] Result<Next> values(std::vector<Reply> replies, Clock::time_point now);
   [[nodiscard]] Result<Next> observe(const ObservedPath& path, Clock::time_point now);
   /// The edges of the path; that which the measurement determines is unspecified.
@@ -80,8 +88,8 @@ class ObserveTask final : public Task {
   const Forest& forest_;
   const Measurement measurement_;
   const std::string determined_;
-  const std::string source_;
-  const std::vector<std::string> settled_;
+  const std::string begin_;  // the name that it began with
+  const EarlierObservations earlier_;
   const bool asks_for_frames_;
   const TimeLimit limit_;
   Stage stage_ = Stage::kNewest;
@@ -97,8 +105,12 @@ class ObserveTask final : public Task {
   Error refused_{};                  // why another one has not
   std::vector<std::string> absent_;  // edges beside the path that are left out, but still exist
   Observed observed_;
+  std::string source_;  // of this attempt
   int attempts_ = 0;
-  int torn_ = 0;
+  std::vector<std::string> awaited_;  // sources of other observations
+  Clock::time_point awaited_since_{};
+  int waits_ = 0;
+  std::vector<std::string> rewritten_;
   std::optional<Clock::time_point> begun_;  // when it was planned first
   Milliseconds pause_{0};
 };

@@ -72,16 +72,22 @@ void add_lacking(const ObservePlan& plan, std::size_t edge, ObservedPath& path) 
     return is_observed(one) && said_source(one.source).empty();
   });
   if (source == own.end() || is_moving(plan.edges[edge].info.id, path.correlations[edge])) return;
+  // One that drifts may have it at another instant only.
+  const auto depends = [&](std::size_t k) {
+    for (std::size_t row = 0; row < path.rows.size(); ++row) {
+      const auto& common_errors = path.edges[row].X_PC.common_errors;
+      const auto same = [&](const CommonError& one) { return one.source == source->source; };
+      if (path.rows[row].edge == k &&
+          std::any_of(common_errors.begin(), common_errors.end(), same)) {
+        return true;
+      }
+    }
+    return false;
+  };
   for (std::size_t k = 0; k < plan.edges.size(); ++k) {
-    const auto& common_errors = path.edges[k].X_PC.common_errors;
-    const auto same = [&](const CommonError& common_error) {
-      return common_error.source == source->source;
-    };
-    // Most have it, so the others are counted afterwards.
-    if (std::any_of(common_errors.begin(), common_errors.end(), same)) continue;
     const std::string& id = plan.edges[k].info.id;
-    if (std::count(with.begin(), with.end(), id) != 1) continue;
-    if (is_moving(id, path.correlations[k])) continue;
+    if (std::count(with.begin(), with.end(), id) != 1 || depends(k)) continue;
+    if (is_moving(id, path.correlations[k]) && !is_drifting(id, path.correlations[k])) continue;
     add_once(id, path.lacking);
     add_once(source->source, path.lacking_sources);
   }

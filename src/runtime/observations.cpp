@@ -1,5 +1,6 @@
 #include "runtime/observations.hpp"
 
+#include <algorithm>
 #include <unistd.h>
 #include <utility>
 
@@ -12,23 +13,28 @@ Result<Observed> Observations::determine(const std::string& id, const Measuremen
   if (auto ok = check_finite(measured.X_AB); !ok) return fail_at("the measurement", ok.error());
   std::string source = std::string(kObservedPrefix) + std::to_string(nanoseconds(wall_clock())) +
                        "." + std::to_string(getpid()) + "." + std::to_string(++count_);
-  ObserveTask task(structure_.forest, measured, id, std::move(source), settled(),
+  ObserveTask task(structure_.forest, measured, id, std::move(source), earlier(),
                    requests_.on_demand() != nullptr, deadline);
   auto applied = requests_.run(task, deadline);
   if (!applied) return tl::unexpected(std::move(applied.error()));
-  settle(task.source());
+  note(task);
   return std::move(task.observed());
 }
 
-std::vector<std::string> Observations::settled() const {
+EarlierObservations Observations::earlier() const {
   const Lock lock(mutex_);
-  return {settled_.begin(), settled_.end()};
+  return {{settled_.begin(), settled_.end()}, {rewritten_.begin(), rewritten_.end()}};
 }
 
-void Observations::settle(std::string source) {
+void Observations::note(const ObserveTask& done) {
   const Lock lock(mutex_);
-  settled_.push_back(std::move(source));
+  settled_.push_back(done.source());
   if (settled_.size() > kMostSettled) settled_.pop_front();
+  for (const std::string& id : done.rewritten()) {
+    if (std::find(rewritten_.begin(), rewritten_.end(), id) == rewritten_.end())
+      rewritten_.push_back(id);
+    if (rewritten_.size() > kMostRewritten) rewritten_.pop_front();
+  }
 }
 
 Result<std::vector<EdgeConsistency>> Observations::consistency(const std::string& partition) {

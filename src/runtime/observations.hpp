@@ -33,16 +33,18 @@ class Observations {
  private:
   // Older ones are recognized by their age.
   static constexpr std::size_t kMostSettled = 16;
+  static constexpr std::size_t kMostRewritten = 64;
 
-  [[nodiscard]] std::vector<std::string> settled() const;
-  void settle(std::string source);
+  [[nodiscard]] EarlierObservations earlier() const;
+  void note(const ObserveTask& done);
 
   Structure& structure_;
   Discovery& discovery_;
   Requests& requests_;
   std::atomic<std::uint64_t> count_{0};
   mutable Mutex mutex_;
-  std::deque<std::string> settled_ TFDUDE_GUARDED_BY(mutex_);  // sources of the last ones, all done
+  std::deque<std::string> settled_ TFDUDE_GUARDED_BY(mutex_);  // see EarlierObservations
+  std::deque<std::string> rewritten_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
@@ -298,6 +299,54 @@ TEST_CASE("uncertainty: concurrent measurements of one path by two clients each 
   REQUIRE(fused);
   REQUIRE(after);
   CHECK(covariance_diff(after->covariance, fused->X.covariance, 0.02) == "");
+}
+
+TEST_CASE("uncertainty: four clients measure overlapping paths at once, and each counts once") {
+  const Join join = testing::join_loopback();
+  Random random(672);
+  INFO("seed " << random.seed());
+  Robot robot(join, random);
+  const std::vector<std::pair<std::string, std::string>> paths = {
+      {"world", "tool"}, {"base", "hand"}, {"arm", "tool"}, {"world", "arm"}};
+  std::vector<Client> clients;
+  std::vector<Transform> Z;
+  for (const auto& [a, b] : paths) {
+    clients.push_back(Client::open(join("")).value());
+    const auto before = robot.client->lookup(a, b);
+    REQUIRE(before);
+    Z.push_back({before->pose, random.covariance(0.002, 0.002)});
+  }
+  constexpr std::size_t kEach = 10;
+  std::vector<std::size_t> done(paths.size());
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    threads.emplace_back([&, k] {
+      for (std::size_t i = 0; i < kEach; ++i) {
+        if (clients[k].observe(paths[k].first, paths[k].second, Z[k])) ++done[k];
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  CHECK(done == std::vector<std::size_t>(paths.size(), kEach));
+  // The same in an owner of all edges, by one client.
+  auto all = Node::open(testing::join_loopback()("all"), "all",
+                        {{"world", "", {}},
+                         {"base", "world", robot.X_world_base},
+                         {"arm", "base", robot.X_base_arm},
+                         {"hand", "arm", robot.X_arm_hand},
+                         {"tool", "hand", robot.X_hand_tool}});
+  REQUIRE(all);
+  for (std::size_t i = 0; i < kEach; ++i) {
+    for (std::size_t k = 0; k < paths.size(); ++k)
+      REQUIRE(all->observe(paths[k].first, paths[k].second, Z[k]));
+  }
+  for (const auto& [a, b] : paths) {
+    const auto expected = all->lookup(a, b);
+    const auto found = robot.client->lookup(a, b);
+    REQUIRE(expected);
+    REQUIRE(found);
+    CHECK(covariance_diff(found->covariance, expected->covariance, 1e-3) == "");
+  }
 }
 
 TEST_CASE("uncertainty: fuse combines another owner's edge with a measurement of it") {

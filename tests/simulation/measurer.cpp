@@ -109,7 +109,7 @@ void Measurer::observe() {
   const auto task = std::make_shared<ObserveTask>(
       process_->forest(),
       Measurement{frame(section.first), frame(section.last), exact_to(kStddev), {}, options},
-      std::string(), source, std::vector<std::string>(), false,
+      std::string(), source, EarlierObservations(), false,
       TimeLimit(RunningCall::kTimeout, process_->world().timeline.steady()));
   begin("observe " + std::to_string(section.first) + "-" + std::to_string(section.last), task,
         [this, task](const Result<void>&) {

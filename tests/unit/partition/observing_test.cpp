@@ -147,9 +147,9 @@ TEST_CASE("an observation waits only for others that may not have reached all ow
   const TimeLimit::Clock::time_point start{std::chrono::hours(1)};
   // Another observation began at 1.000 s, as its name says; this one later by so much.
   const auto pause_after = [&](std::chrono::milliseconds later, const std::string& other,
-                               const std::vector<std::string>& settled) {
+                               const EarlierObservations& earlier) {
     const std::string own = "observed:" + std::to_string(nanoseconds(Time(1s) + later)) + ".7.1";
-    ObserveTask task(known.forest, {"tool", "world", random.transform(), {}, {}}, "", own, settled,
+    ObserveTask task(known.forest, {"tool", "world", random.transform(), {}, {}}, "", own, earlier,
                      false, TimeLimit(1s, start));
     REQUIRE(task.plan(known.directory, start));
     const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
@@ -167,8 +167,45 @@ TEST_CASE("an observation waits only for others that may not have reached all ow
   CHECK(pause_after(10ms, other, {}));
   CHECK(pause_after(-10s, other, {}));  // the clocks differ
   CHECK(pause_after(10ms, "observed:other", {}));
-  CHECK_FALSE(pause_after(60ms, other, {}));
-  CHECK_FALSE(pause_after(10ms, other, {"observed:x", other}));
+  CHECK_FALSE(pause_after(410ms, other, {}));
+  CHECK_FALSE(pause_after(10ms, other, {{"observed:x", other}, {}}));
+}
+
+// The first of them is at one owner, and nothing more comes.
+TEST_CASE("an observation waits for one under way, and less for edges that others write often") {
+  Random random(0x0b59);
+  const Known known(random);
+  const TimeLimit::Clock::time_point start{std::chrono::hours(1)};
+  const auto plan = route_observe(known.forest, known.directory, "tool", "world", {}, {});
+  REQUIRE(plan);
+  const CommonError other{"observed:1000000000.3.5.0", true, Loading::Ones(6, 1)};
+  const auto waits_for = [&](const std::vector<std::string>& rewritten) {
+    ObserveTask task(known.forest, {"tool", "world", random.transform(), {}, {}}, "",
+                     "observed:1002000000.7.1", {{}, rewritten}, false, TimeLimit(1s, start));
+    auto now = start;
+    while (task.plan(known.directory, now)) {
+      auto answers = answers_to(*plan, random);
+      answers[0].correlations[0] = {{}, {other}, {"tool", "hand"}};
+      std::vector<Reply> replies(answers.size());
+      for (std::size_t i = 0; i < answers.size(); ++i) replies[i].body = std::move(answers[i]);
+      const auto next = task.take(std::move(replies), now);
+      REQUIRE(next);
+      if (*next != Task::Next::kPlan) break;
+      REQUIRE(task.pause() > Milliseconds(0));
+      now += task.pause();
+    }
+    CHECK(task.rewritten() == std::vector<std::string>{"hand"});
+    // The name says when this one was computed, so that others know how long to wait for it.
+    const auto computed = 1002000000 + nanoseconds(Time((now - start)));
+    CHECK(task.source() == "observed:" + std::to_string(computed) + ".7.1.0");
+    return std::chrono::duration_cast<Milliseconds>(now - start);
+  };
+  const auto first = waits_for({});
+  CHECK(first > 390ms);
+  CHECK(first < 410ms);
+  const auto again = waits_for({"hand"});
+  CHECK(again > 20ms);
+  CHECK(again < 40ms);
 }
 
 TEST_CASE("an observation beside one in progress stays tied to the edges that lack it") {
