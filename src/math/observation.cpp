@@ -15,6 +15,7 @@
 #include "math/corrected_errors.hpp"
 #include "math/decompositions.hpp"
 #include "math/minimum.hpp"
+#include "math/not_exact.hpp"
 #include "math/observe_beside.hpp"
 #include "math/path_minimum.hpp"
 #include "math/semidefinite.hpp"
@@ -31,13 +32,6 @@ Covariance seen(const Matrix6d& H, const Matrix6d& sigma) {
 // Of a part of unknown correlation, which counts as measurement error.
 Covariance unknown_seen(const Matrix6d& H, const Belief& edge) {
   return seen(H, with_bounded_rotations(edge.unknown->matrix()));
-}
-
-// A root of the covariance of a measurement, with at least these deviations.
-Loading not_exact(const Loading& root, const Twist& least) {
-  constexpr double kClear = 1e3;
-  if (Factor(root, kClear * least).rank() == 6) return root;
-  return compressed(joined(root, Matrix6d(least.asDiagonal())));
 }
 
 void forget(const CorrectedError& error, ObservedResult& result) {
@@ -63,7 +57,7 @@ class Update {
   Result<Observation> run() {
     if (unknown_rotations_ > 0) turn_to(at_start().X_AB);
     if (auto ok = count_unknown(); !ok) return tl::unexpected(std::move(ok.error()));
-    root_ = not_exact(root_, prior_.least_on_path(at_start().H, false));
+    root_ = not_exact(root_, prior_, at_start().H, false);
     // Parts that may be correlated are judged by their bound.
     PathMinimum found = first_minimum();
     for (int i = 1; i < kMostTurns && turns(found); ++i) {
@@ -302,8 +296,8 @@ class Unspecified {
  private:
   void correlate(const JointPrior& others, const LinearPath& linear, const std::string& source,
                  Observation& found) const {
-    const Loading root = not_exact(root_of(Z_AB_.covariance.of_specified().matrix()),
-                                   others.least_on_path(linear.H, true));
+    const Loading root =
+        not_exact(root_of(Z_AB_.covariance.of_specified().matrix()), others, linear.H, true);
     const auto determined = determined_errors(others, index_, linear, root, source, merge_);
     const auto put = [&](std::size_t k, const CorrectedError& error) {
       found.edges[k].X_PC.own = Covariance::trusted(nearest_semidefinite(error.own));
