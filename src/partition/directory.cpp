@@ -364,16 +364,18 @@ const std::string* Directory::incomplete() const {
 }
 
 bool Directory::note_announced_epoch(Owner owner, std::uint64_t epoch) {
-  std::uint64_t& told = partitions_[owner].told_epoch;
-  if (epoch <= told) return false;
-  told = epoch;
+  Known& partition = partitions_[owner];
+  const std::uint64_t process = partition.process();
+  if (partition.told_by == process && epoch <= partition.told_epoch) return false;
+  partition.told_by = process;
+  partition.told_epoch = epoch;
   return true;
 }
 
 std::vector<SeenEpoch> Directory::announced_epochs() const {
   std::vector<SeenEpoch> all;
   for (const Known& partition : partitions_) {
-    if (partition.told_epoch > 0) all.push_back({partition.info.name, partition.told_epoch});
+    if (partition.is_told()) all.push_back({partition.info.name, partition.told_epoch});
   }
   return all;
 }

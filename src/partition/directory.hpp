@@ -203,9 +203,12 @@ class Directory {
   bool note_announced_epoch(Owner owner, std::uint64_t epoch);
   /// All such changes: the latest of each owner.
   [[nodiscard]] std::vector<SeenEpoch> announced_epochs() const;
-  /// Whether that change has not come yet.
+  /// Whether that change has not come yet. A process that follows does not owe what its predecessor
+  /// has announced: it shows all that was stored, and nothing else will come.
   [[nodiscard]] bool owes_change(Owner owner) const {
-    return !without_pages_ && partitions_[owner].epoch < partitions_[owner].told_epoch;
+    const Known& partition = partitions_[owner];
+    return !without_pages_ && partition.is_told() &&
+           (partition.incarnation != partition.told_by || partition.epoch < partition.told_epoch);
   }
   /// The name of a reachable partition with an announced change that has not come yet; null: none.
   [[nodiscard]] const std::string* behind() const;
@@ -264,6 +267,7 @@ class Directory {
     std::uint64_t epoch = 0;          // up to which everything has come
     std::uint64_t awaited_epoch = 0;  // will be complete once `awaited` has come
     std::uint64_t told_epoch = 0;     // of an announced change
+    std::uint64_t told_by = 0;        // the process that has announced it
     std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;
@@ -293,6 +297,9 @@ class Directory {
     [[nodiscard]] bool outdated(std::uint64_t one) const {
       return one < live || one < heard_of || (forgotten && one == heard_of);
     }
+    // Whether the process that runs has announced a change.
+    [[nodiscard]] bool is_told() const { return told_epoch > 0 && told_by == process(); }
+    [[nodiscard]] std::uint64_t process() const { return std::max(live, incarnation); }
     [[nodiscard]] bool is_cut() const { return cut == live && !left_out.empty(); }
     [[nodiscard]] bool complete() const {
       return !successor && pages.size() >= page_count && !is_cut();

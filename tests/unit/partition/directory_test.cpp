@@ -283,6 +283,28 @@ TEST_CASE("a directory is behind until an announced change has arrived") {
     replica.directory.apply(Page{"arms", 0, 1, 4, {}});
   }
   SECTION("the owner is lost") { replica.directory.lost("arms", 1, kNow); }
+  SECTION("a process without frames follows, and will never be so far") {
+    replica.directory.lost("arms", 1, kNow);
+    replica.directory.apply(presence_of("arms", 2, 0), kNow);
+  }
+  SECTION("a process with fewer frames follows") {
+    replica.directory.apply(presence_of("arms", 2, 1), kNow);
+    replica.directory.apply(Page{"arms", 0, 2, 1, {}});
+  }
+  CHECK(replica.directory.behind() == nullptr);
+}
+
+TEST_CASE("a directory is behind until the change of a process has come of which no page has") {
+  Replica replica;
+  replica.directory.apply(presence_of("arms", 1, 1), kNow);
+  replica.directory.apply(Page{"arms", 0, 1, 7, {{"arm", "", 1}}});
+  replica.directory.apply(presence_of("arms", 2, 1), kNow);
+  const Owner arms = *replica.directory.owner("arms");
+  replica.directory.note_announced_epoch(arms, 3);
+  REQUIRE(replica.directory.behind() != nullptr);
+  replica.directory.apply(Page{"arms", 0, 2, 2, {{"arm", "", 1}}});
+  CHECK(replica.directory.behind() != nullptr);
+  replica.directory.apply(Page{"arms", 0, 2, 3, {{"arm", "", 1}}});
   CHECK(replica.directory.behind() == nullptr);
 }
 
