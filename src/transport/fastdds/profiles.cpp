@@ -58,8 +58,10 @@ Result<std::string> make_known(const std::string& xml) TFDUDE_REQUIRES(loading()
 }
 
 // DDS samples have very different sizes. Fast DDS 2.9 accepts one that is larger than preallocated
-// only with this policy and the dynamic one, whatever the names of the others say.
-constexpr auto kMemoryPolicy = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
+// only with the two dynamic policies, whatever the names of the others say. A reader frees the
+// memory of each sample: if it were reused, the largest samples that strangers ever sent stayed.
+constexpr auto kMemoryOfWriters = ertps::DYNAMIC_REUSABLE_MEMORY_MODE;
+constexpr auto kMemoryOfReaders = ertps::DYNAMIC_RESERVE_MEMORY_MODE;
 
 // A built-in profile is loaded when it is first needed: Fast DDS 2.9 compiles regular expressions
 // for each duration in it. All of them took half of the processor time of a short command.
@@ -129,7 +131,7 @@ edds::DataWriterQos Profiles::writer(edds::Publisher& publisher, const std::stri
   // while a write iterates over it, and crash when readers come and go.
   qos.writer_resource_limits().reader_filters_allocation.initial = 0;
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
-  qos.endpoint().history_memory_policy = kMemoryPolicy;
+  qos.endpoint().history_memory_policy = kMemoryOfWriters;
   return qos;
 }
 
@@ -138,7 +140,7 @@ edds::DataReaderQos Profiles::reader(edds::Subscriber& subscriber, const std::st
   fill(name, [&](const std::string& profile) {
     return subscriber.get_datareader_qos_from_profile(profile, qos);
   });
-  qos.endpoint().history_memory_policy = kMemoryPolicy;
+  qos.endpoint().history_memory_policy = kMemoryOfReaders;
   return qos;
 }
 
