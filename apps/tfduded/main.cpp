@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <malloc.h>
 #include <string>
 #include <utility>
 #include <vector>
@@ -131,6 +132,10 @@ int serve(const Arguments& arguments, const sigset_t& stop_signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Larger blocks go back to the system when they are freed, whatever lies beside them. By default
+  // the C library keeps more and more after large ones, and anybody may send large samples.
+  constexpr int kLarge = 256 << 10;
+  (void)mallopt(M_MMAP_THRESHOLD, kLarge);
   Arguments arguments;
   if (const auto status = read_arguments(argc, argv, arguments)) return *status;
   const sigset_t stop_signals = tfdude::cli::block_stop_signals();

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "tfdude/client/node.hpp"
 #include "tfdude/transport/fastdds.hpp"
@@ -14,9 +15,11 @@
 #include "support/domain_lease.hpp"
 #include "support/foreign_writer.hpp"
 #include "support/joint_frames.hpp"
+#include "support/memory_of.hpp"
 #include "support/process.hpp"
 #include "support/random.hpp"
 #include "support/recorder.hpp"
+#include "support/test_domain.hpp"
 #include "transport/fastdds/codec.hpp"
 #include "transport/port.hpp"
 
@@ -94,6 +97,34 @@ TEST_CASE("an update of a plain DDS writer to all partitions passes only the own
   CHECK(other.counters->updates_passed == 0);
   CHECK(owner.counters->updates_passed == 1);
   CHECK_FALSE(moved(other.node, "b"));
+}
+
+// They are no requests, so nothing of them is kept. Two writers at once need more than one needs.
+TEST_CASE("the memory of large samples goes back to the system once they were read") {
+  const testing::TestDomain domain;
+  const testing::TemporaryDirectory files;
+  const auto robot =
+      domain.serve(files.write("robot.yaml", "partition: robot\nframes:\n  - {id: base}\n"));
+  const long before = testing::memory_of(robot);
+  Bytes sample(10U << 20U, 'a');
+  sample[0] = 0;
+  sample[1] = 1;
+  sample[2] = sample[3] = 0;
+  const auto send = [&] {
+    ForeignWriter writer(domain.number(), "tfdude/request",
+                         fastdds::edds::TypeSupport(new RawType("tfdude::wire::Request", false)),
+                         "robot");
+    writer.await_readers(1);
+    Bytes own = sample;
+    for (int i = 0; i < 20; ++i) writer.write(&own);
+  };
+  std::thread other(send);
+  send();
+  other.join();
+  long after = 0;
+  CHECK(eventually([&] { return (after = testing::memory_of(robot)) < before + 100; }));
+  INFO("before: " << before << " MiB, then " << after);
+  CHECK(domain.cli({"exists", "base"}).status == 0);
 }
 
 // A killed process whose clock was ahead has left a page that DDS holds back until an earlier one

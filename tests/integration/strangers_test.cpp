@@ -4,15 +4,14 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <string>
-#include <unistd.h>
 #include <vector>
 
 #include "tfdude/client/client.hpp"
 
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
+#include "support/memory_of.hpp"
 #include "support/process.hpp"
 #include "support/stranger.hpp"
 #include "support/test_domain.hpp"
@@ -21,18 +20,10 @@ namespace tfdude {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::memory_of;
 using testing::Process;
 using testing::TemporaryDirectory;
 using testing::TestDomain;
-
-// Resident memory of a process [MiB].
-long memory_of(const Process& process) {
-  std::ifstream file("/proc/" + std::to_string(process.pid()) + "/statm");
-  long total = 0;
-  long resident = 0;
-  file >> total >> resident;
-  return resident * sysconf(_SC_PAGESIZE) / (1024 * 1024);
-}
 
 struct TwoDaemons {
   TestDomain domain;
