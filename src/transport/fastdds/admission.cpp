@@ -41,7 +41,8 @@ void Admission::authenticated(const PeerId& peer, bool verified) {
     known->second.excluded_because =
         "and this participant do not accept each other's keys: one of them is expired or revoked";
     note_awaited();
-    log().warn("partition {} {}", quote(known->second.said.partition),
+    const std::string& partition = known->second.said.partition;
+    log().warn("{} {}", partition.empty() ? "a client" : "partition " + quote(partition),
                known->second.excluded_because);
   }
 }

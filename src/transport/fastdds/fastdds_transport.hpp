@@ -76,7 +76,7 @@ class FastDdsTransport final : public Transport {
   void end_pushing(std::uint64_t group) override { push_channels_->end_pushing(group); }
   Result<void> publish_clock(Time now) override;
   bool discovered() const override {
-    return !admission_.awaits_authentication() && peers_.discovered();
+    return !admission_.awaits_authentication() && peers_.discovered(admission_.excluded().size());
   }
   bool awaits_presence() const override {
     return admission_.awaits_authentication() || peers_.awaits_presence();

@@ -211,12 +211,13 @@ std::vector<std::string> Peers::look_for_silent(Clock::time_point now, Clock::du
   return unheard;
 }
 
-bool Peers::discovered() const {
+bool Peers::discovered(std::size_t excluded) const {
   const Lock lock(mutex_);
   if (servers_.empty() || !all_present() || is_about_to_be_served()) return false;
   const auto [most, least] = unknown_here();
-  if (most > 0) return false;
-  return Clock::now() - last_met_ >= (least == 0 ? kAgreedQuiet : kQuiet);
+  // Others may have met those that are excluded here, before their keys expired.
+  if (most > static_cast<long>(excluded)) return false;
+  return Clock::now() - last_met_ >= (most == 0 && least == 0 ? kAgreedQuiet : kQuiet);
 }
 
 bool Peers::is_heard(const std::string& partition) const {

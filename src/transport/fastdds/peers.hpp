@@ -149,7 +149,8 @@ class Peers {
   /// Whether some server was discovered, nobody new for kQuiet or kAgreedQuiet, all servers have
   /// announced what they serve, and none hears more others than this participant knows. For one
   /// that serves nothing, some server must do more than claim a partition.
-  [[nodiscard]] bool discovered() const;
+  /// @param excluded  how many servers keys exclude here, though others may hear them
+  [[nodiscard]] bool discovered(std::size_t excluded = 0) const;
 
   /// Whether some server was discovered that has not announced yet what it serves. A server that
   /// has sent a page and then become silent is not waited for.

@@ -252,6 +252,14 @@ TEST_CASE("discovery is complete when all peers know as many participants") {
     std::this_thread::sleep_for(Peers::kAgreedQuiet);
     CHECK(one.peers.discovered());
   }
+  SECTION("a peer that has met one whose keys have expired since") {
+    one.meet(1, "arms", 1);
+    std::this_thread::sleep_for(Peers::kAgreedQuiet);
+    CHECK_FALSE(one.peers.discovered(1));  // another may answer yet
+    std::this_thread::sleep_for(Peers::kQuiet);
+    CHECK(one.peers.discovered(1));
+    CHECK_FALSE(one.peers.discovered());
+  }
   SECTION("a peer that knows fewer may report more late") {
     one.meet(1, "arms", 1);
     one.meet(2, "head", 0);
