@@ -1,7 +1,6 @@
 #include "math/not_exact.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "math/square_root.hpp"
 
@@ -12,7 +11,9 @@ namespace {
 // rounding, also if many paths that share edges are measured often, and far below what anybody
 // measures.
 constexpr double kShare = 3e-4;
-// Deviations differ by less unless one of them stands for zero.
+// Below that share of what cancels, a deviation may stand for zero...
+constexpr double kExact = 3e-5;
+// ...and if it is below that share of the deviations beside it.
 constexpr double kAsExact = 1e-4;
 // What is above this share of a floor is measured, and stays as it is...
 constexpr double kMeasured = 0.03;
@@ -36,21 +37,21 @@ Loading not_exact(const Loading& root, const JointPrior& prior, const std::vecto
                   bool of_all) {
   const Twist least = prior.least_on_path(H, of_all);
   const Twist size = prior.size_on_path(H);
-  Twist floor = least;
-  for (const Eigen::Index unit : {0, 3}) {
-    // Of all three axes, as that of one shrinks with each measurement.
-    const double beside =
-        std::min(least_beside(root.middleRows(unit, 3)), size.segment<3>(unit).maxCoeff());
-    for (Eigen::Index i = unit; i < unit + 3 && beside > 0; ++i) {
-      floor[i] = std::max(floor[i], kShare * beside);
+  // Of one edge nothing cancels, unless its errors are those of others, too.
+  const bool may_cancel = prior.is_tied() || !least.isZero(0);
+  if (may_cancel && Factor(root, kExact * size).rank() < 6) {
+    Twist floor = least;
+    for (const Eigen::Index unit : {0, 3}) {
+      // Of all three axes, as that of one shrinks with each measurement.
+      const double beside =
+          std::min(least_beside(root.middleRows(unit, 3)), size.segment<3>(unit).maxCoeff());
+      for (Eigen::Index i = unit; i < unit + 3; ++i) floor[i] = std::max(floor[i], kShare * beside);
     }
+    if (Factor(root, kMeasured * floor).rank() < 6)
+      return compressed(joined(root, Matrix6d(floor.asDiagonal())));
   }
-  for (const auto& [deviations, measured] :
-       {std::pair(floor, kMeasured), std::pair(least, kClear)}) {
-    if (Factor(root, measured * deviations).rank() < 6)
-      return compressed(joined(root, Matrix6d(deviations.asDiagonal())));
-  }
-  return root;
+  if (Factor(root, kClear * least).rank() == 6) return root;
+  return compressed(joined(root, Matrix6d(least.asDiagonal())));
 }
 
 }  // namespace tfdude
