@@ -28,7 +28,7 @@ constexpr int kAtOnce = 3;
 constexpr Milliseconds kTornFor{400};
 // The same if such an edge was written before, as one that somebody updates again and again.
 constexpr Milliseconds kTornForRewritten{30};
-constexpr Milliseconds kLongestPause{8};
+constexpr Milliseconds kLongestPause{32};
 
 bool has(const std::vector<std::string>& all, const std::string& one) {
   return std::find(all.begin(), all.end(), one) != all.end();

@@ -202,7 +202,7 @@ TEST_CASE("an observation waits for one under way, and less for edges that other
   };
   const auto first = waits_for({});
   CHECK(first > 390ms);
-  CHECK(first < 410ms);
+  CHECK(first < 440ms);
   const auto again = waits_for({"hand"});
   CHECK(again > 20ms);
   CHECK(again < 40ms);
