@@ -13,8 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
@@ -24,6 +22,7 @@
 #include "support/networks.hpp"
 #include "support/random.hpp"
 #include "support/random_walk.hpp"
+#include "support/sampling.hpp"
 #include "support/sanitizers.hpp"
 #include "tree/sample_rows.hpp"
 
@@ -70,7 +69,7 @@ class DenseFilter {
   void observe(const std::map<std::string, Matrix6d>& path, const Covariance& R) {
     const Matrix PH = with(path);
     const Matrix6d S = of(path) + R.matrix();
-    P_ -= (PH * S.inverse() * PH.transpose()).eval();
+    P_ -= (PH * testing::inverse_of(S) * PH.transpose()).eval();
   }
   [[nodiscard]] Matrix6d of(const std::map<std::string, Matrix6d>& path) const {
     const Matrix PH = with(path);
@@ -102,9 +101,7 @@ bool is_close(const Matrix6d& found, const Matrix6d& expected) {
 
 // The least of their ratio in any direction.
 double least_ratio(const Matrix6d& found, const Matrix6d& expected) {
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d>(found, expected)
-      .eigenvalues()
-      .minCoeff();
+  return testing::ratios(found, expected)[0];
 }
 
 // When observations come.

@@ -404,7 +404,7 @@ TEST_CASE("keys: several processes may use one identity, and a daemon may restar
 TEST_CASE("keys: a new participant does not wait until a handshake is repeated") {
   const SecuredRobot robot;
   std::vector<std::chrono::milliseconds> meetings;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 80; ++i) {
     const auto begin = std::chrono::steady_clock::now();
     auto client = robot.client("eye");
     REQUIRE(client->lookup("base", "secret_forearm"));

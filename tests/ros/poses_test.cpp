@@ -4,9 +4,8 @@
 #include <random>
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include "support/catch.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude::ros {
 namespace {
@@ -45,7 +44,7 @@ TEST_CASE("ros poses: the covariance sent is that of samples about the fixed axe
   REQUIRE(message);
   std::mt19937_64 random(20);  // NOLINT(cert-msc51-cpp): the same each time
   std::normal_distribution<double> normal;
-  const Matrix6d L = covariance().matrix().llt().matrixL();
+  const Matrix6d L = testing::cholesky_root(covariance().matrix());
   constexpr int kSamples = 200'000;
   Matrix6d moment = Matrix6d::Zero();
   const Pose back = X.pose.inverse();

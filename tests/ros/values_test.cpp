@@ -12,6 +12,7 @@
 
 #include "ros_rig.hpp"
 #include "support/catch.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
@@ -70,8 +71,8 @@ struct Robot {
 };
 
 double nees(const Transform& X, const Pose& truth) {
-  const Twist e = log(X.pose.inverse() * truth);
-  return e.dot(X.covariance.of_specified().matrix().ldlt().solve(e));
+  return testing::squared_distance(log(X.pose.inverse() * truth),
+                                   X.covariance.of_specified().matrix());
 }
 
 const char* const kConfig =

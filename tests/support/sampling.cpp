@@ -15,6 +15,11 @@ Eigen::VectorXd eigenvalues(const Eigen::MatrixXd& symmetric) {
       .eigenvalues();
 }
 
+Twist ratios(const Matrix6d& claimed, const Matrix6d& right) {
+  return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d>(claimed, right, Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
 Matrix6d cholesky_root(const Matrix6d& positive) { return positive.llt().matrixL(); }
 
 Matrix6d inverse_of(const Matrix6d& matrix) { return matrix.inverse(); }

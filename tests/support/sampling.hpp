@@ -14,6 +14,10 @@ namespace tfdude::testing {
 /// Of a symmetric matrix, ascending.
 [[nodiscard]] Eigen::VectorXd eigenvalues(const Eigen::MatrixXd& symmetric);
 
+/// Of claimed variances to right ones in all directions, ascending: eigenvalues of the pair. The
+/// right ones are positive.
+[[nodiscard]] Twist ratios(const Matrix6d& claimed, const Matrix6d& right);
+
 /// L with L Lᵀ = A.
 [[nodiscard]] Matrix6d cholesky_root(const Matrix6d& positive);
 

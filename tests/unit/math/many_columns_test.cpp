@@ -3,14 +3,12 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "tfdude/math/observation.hpp"
 #include "tfdude/math/perturbation.hpp"
 
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 // One base that drifts sees many objects, each from another place. So their errors have nearly as
 // many columns in common as rows. All is beside a dense Kalman filter of the same joint covariance.
@@ -122,7 +120,7 @@ class Drifting {
     const Eigen::MatrixXd seen = P_.middleRows<6>(row(object)) - H * P_.topRows<6>();
     const Matrix6d S =
         seen.middleCols<6>(row(object)) - seen.leftCols<6>() * H.transpose() + kSighting;
-    const Eigen::MatrixXd rest = P_ - seen.transpose() * S.inverse() * seen;
+    const Eigen::MatrixXd rest = P_ - seen.transpose() * testing::inverse_of(S) * seen;
     P_ = (rest + rest.transpose()) / 2;
   }
 
@@ -136,8 +134,8 @@ class Drifting {
 
 // The least and the greatest ratio of variances over all directions.
 std::pair<double, double> ratios(const Matrix6d& claimed, const Matrix6d& right) {
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(claimed, right);
-  return {solver.eigenvalues().minCoeff(), solver.eigenvalues().maxCoeff()};
+  const Twist all = testing::ratios(claimed, right);
+  return {all.minCoeff(), all.maxCoeff()};
 }
 
 // In a random order, at first in that of their numbers.

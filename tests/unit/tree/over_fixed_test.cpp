@@ -13,6 +13,7 @@
 #include "support/catch.hpp"
 #include "support/jacobian.hpp"
 #include "support/random.hpp"
+#include "support/sampling.hpp"
 
 namespace tfdude {
 namespace {
@@ -372,7 +373,7 @@ TEST_CASE(
     const Matrix6d noise = random.covariance(0.002, 0.002).matrix();
     Matrix6d S = noise;
     for (const int i : {0, 1}) S += H[i] * before[i] * H[i].transpose();
-    const Matrix6d root = S.inverse().llt().matrixL();
+    const Matrix6d root = testing::cholesky_root(testing::inverse_of(S));
     for (const int i : {0, 1}) {
       const Loading loading = before[i] * H[i].transpose() * root;
       ways.to_a[static_cast<std::size_t>(i)].X_PC.common_errors = {{"observed:1", true, loading}};
