@@ -75,7 +75,8 @@ Result<std::shared_ptr<WatchedPath>> WatchClient::follow(std::shared_ptr<Watched
   watches_paths_ = true;
   add(path);
   auto live = path->wait_until_live(deadline.at());
-  if (live) return path;
+  // The rounds have it, too.
+  if (live) return std::shared_ptr<WatchedPath>(path.get(), [path](auto* one) { one->leave(); });
   if (live.error().code == Errc::kNotYet) return unanswered(*path, deadline);
   return tl::unexpected(std::move(live.error()));
 }

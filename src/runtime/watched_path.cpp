@@ -384,8 +384,9 @@ void WatchedPath::end() {
 
 void WatchedPath::report(std::string what) {
   if (routes_ == nullptr || !options_.on_route) return;
-  routes_->post(
-      [path = shared_from_this(), what = std::move(what)] { path->options_.on_route(what); });
+  routes_->post([path = shared_from_this(), what = std::move(what)] {
+    if (!path->left_) path->options_.on_route(what);
+  });
 }
 
 void WatchedPath::report_rerouted() {

@@ -87,6 +87,9 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   [[nodiscard]] std::shared_ptr<void> on_news(Listener listener);
   /// See PathWatch::on_value(). @return ends it
   [[nodiscard]] std::shared_ptr<void> on_value(ValueCallback callback);
+  /// Nobody watches it any more: no function of the user is called from now on, except one whose
+  /// call has begun. It is followed until the next round.
+  void leave() { left_ = true; }
   /// Waits until the path is followed and its dynamic edges have a common instant; lack of the
   /// latter is no error.
   /// @return why it is not followed, at the deadline
@@ -213,6 +216,7 @@ class WatchedPath final : public Watched, public std::enable_shared_from_this<Wa
   std::atomic<const WatchMirror*> shown_{nullptr};      // followed_, for readers
   std::atomic<const StampedTransform*> held_{nullptr};  // holder_, for readers
   std::atomic<std::uint64_t> messages_{0};
+  std::atomic<bool> left_{false};
   std::atomic<std::uint64_t> ends_{0};  // how often it had no answer any more
   // The latest instant [ns] that was read in memory: what is shown instead is not older.
   mutable std::atomic<std::int64_t> latest_read_{std::numeric_limits<std::int64_t>::min()};

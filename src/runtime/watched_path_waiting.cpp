@@ -38,7 +38,7 @@ struct WatchedPath::Values {
   void call() {
     due = false;
     const auto watched = path.lock();
-    if (!watched) return;
+    if (!watched || watched->left_) return;
     const auto X = watched->lookup({});
     if (X ? told && !failed && is_same_value(*told, *X) : failed) return;
     if (X) told = *X;

@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -266,6 +267,32 @@ TEST_CASE("waiting: on_value() calls with the newest value, and with the reason 
   REQUIRE(world.node.update("base", ahead(6)));
   CHECK(watch->wait_next(20s));
   CHECK(calls.load() == 1);
+}
+
+TEST_CASE("waiting: on_value() calls nothing any more once nobody watches the path") {
+  World world;
+  REQUIRE(world.node.update("base", ahead(1), instant(0)));
+  auto watch = std::make_optional(world.client.watch("world", "base").value());
+  Passed passed;
+  const auto note = [&](const Result<StampedTransform>&) { passed.add("value"); };
+  const Subscription values = watch->on_value(note);
+  REQUIRE(passed.gets(1));
+  // What a later watch has told, the first one would have told before.
+  const auto other = world.client.watch("world", "base");
+  REQUIRE(other);
+  Passed later;
+  const Subscription others =
+      other->on_value([&](const Result<StampedTransform>&) { later.add("value"); });
+  REQUIRE(later.gets(1));
+  auto copy = watch;
+  watch.reset();
+  REQUIRE(world.node.update("base", ahead(2), instant(10)));
+  REQUIRE(passed.gets(2));
+  REQUIRE(later.gets(2));
+  copy.reset();
+  REQUIRE(world.node.update("base", ahead(3), instant(20)));
+  REQUIRE(later.gets(3));
+  CHECK(passed.now().size() == 2);
 }
 
 TEST_CASE("waiting: a filter passes messages on when their transform can be had") {

@@ -65,7 +65,8 @@ class TFDUDE_EXPORT PathWatch {
   /// as for wait_next(), or with the reason when there is none any more. On a library thread that
   /// holds no lock: it may call any function and take any time; meanwhile values are not queued,
   /// and the newest comes next. Must not throw. Ends with the Subscription, the last PathWatch of
-  /// the path, or the client.
+  /// the path, or the client. A call that has begun may outlast the last PathWatch, but neither of
+  /// the others.
   [[nodiscard]] Subscription on_value(
       std::function<void(const Result<StampedTransform>&)> callback) const;
 

@@ -145,8 +145,8 @@ struct WatchOptions {
   EdgeTiming timing{};
   /// Called when the route of the path has changed, or with the reason why there is none for now.
   /// One call at a time, from a library thread that holds no lock: it may call any function, also
-  /// watch(). Must not throw. One call that was due may still come after the last PathWatch of the
-  /// path is gone, but none after the client's destructor has returned.
+  /// watch(). Must not throw. A call that has begun may outlast the last PathWatch of the path, but
+  /// not the client's destructor.
   std::function<void(const std::string& what)> on_route;
 };
 
