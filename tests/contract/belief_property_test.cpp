@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-
 #include "tfdude/client/client.hpp"
 #include "tfdude/client/node.hpp"
 #include "tfdude/math/joint.hpp"
