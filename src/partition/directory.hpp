@@ -353,7 +353,8 @@ class Directory {
   void forget_use(const std::string& name, std::multiset<Owner> JointUse::*part, Owner owner);
   /// Whether it may own a frame; another partition may have all frames of one that is absent.
   [[nodiscard]] bool has_frames(Owner owner) const;
-  [[nodiscard]] std::vector<Owner> movers_of(const JointUse& use) const;
+  /// Those of several that have frames; none of these has joints otherwise.
+  [[nodiscard]] std::vector<Owner> living(const std::multiset<Owner>& owners) const;
   [[nodiscard]] Result<JointRoute> route_joint_of(Owner owner, const std::string& name) const;
   [[nodiscard]] static std::optional<Owner> mimicker_of(const JointUse& use);
   [[nodiscard]] std::string contested_text(const std::string& joint, const JointUse& use,

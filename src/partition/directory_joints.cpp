@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "tfdude/base/id.hpp"
 
@@ -67,13 +68,14 @@ bool Directory::has_frames(Owner owner) const {
                      [owner](const FrameInfo& frame) { return frame.owner == owner; });
 }
 
-std::vector<Owner> Directory::movers_of(const JointUse& use) const {
-  std::vector<Owner> movers = distinct(use.movers);
-  if (movers.size() < 2) return movers;
-  movers.erase(std::remove_if(movers.begin(), movers.end(),
-                              [this](Owner owner) { return !has_frames(owner); }),
-               movers.end());
-  return movers;
+// A lost partition has no joints any more if others own all its frames.
+std::vector<Owner> Directory::living(const std::multiset<Owner>& owners) const {
+  std::vector<Owner> all = distinct(owners);
+  if (all.size() < 2) return all;
+  all.erase(
+      std::remove_if(all.begin(), all.end(), [this](Owner owner) { return !has_frames(owner); }),
+      all.end());
+  return all;
 }
 
 // With it moves a joint of its own that mimics one of these, of which it cannot be known.
@@ -110,7 +112,7 @@ std::string Directory::contested_text(const std::string& joint, const JointUse& 
 void Directory::report_contested(const std::string& joint) {
   const auto use = joints_.find(joint);
   const std::vector<Owner> movers =
-      use == joints_.end() ? std::vector<Owner>() : movers_of(use->second);
+      use == joints_.end() ? std::vector<Owner>() : living(use->second.movers);
   if (movers.size() < 2) {
     contested_joints_.erase(joint);
     return;
@@ -130,12 +132,13 @@ void Directory::report_contested(const std::string& joint) {
 Result<Directory::JointRoute> Directory::route_joint(const std::string& name) const {
   if (const auto known = joints_.find(name); known != joints_.end()) {
     const JointUse& use = known->second;
-    if (const auto movers = movers_of(use); movers.size() > 1) {
+    if (const auto movers = living(use.movers); movers.size() > 1) {
       return fail(Errc::kAmbiguousJoint, contested_text(name, use, movers));
     }
     std::multiset<Owner> all = use.movers;
     all.insert(use.others.begin(), use.others.end());
-    return JointRoute{name, distinct(all)};
+    auto owners = living(all);
+    return JointRoute{name, owners.empty() ? distinct(all) : std::move(owners)};
   }
   // Names of partitions may contain slashes, too.
   for (std::size_t at = name.find('/'); at != std::string::npos; at = name.find('/', at + 1)) {
@@ -156,13 +159,13 @@ Result<Directory::JointRoute> Directory::route_joint_of(Owner owner,
     return fail(Errc::kUnknownJoint, "no joint " + quote(name));
   }
   const JointUse& use = known->second;
-  const auto movers = movers_of(use);
+  const auto movers = living(use.movers);
   JointRoute route{name, {owner}};
   if (movers.size() > 1) {
     if (!mimicker_of(use)) return route;
     return fail(Errc::kAmbiguousJoint, contested_text(name, use, movers));
   }
-  for (const Owner other : distinct(use.others)) {
+  for (const Owner other : living(use.others)) {
     if (other != owner) route.owners.push_back(other);
   }
   return route;

@@ -1,5 +1,6 @@
 // Joints of equal names in several partitions.
 
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,6 +116,29 @@ TEST_CASE("joint routes: a partition that has lost all its frames moves nothing"
   CHECK(caller.routes("elbow") == Lines{kSay});
   REQUIRE(caller.directory.forget("left", 1, kNow));
   CHECK(caller.routes("elbow") == Lines{"right gets elbow"});
+}
+
+TEST_CASE(
+    "joint routes: who has taken over all frames of a lost partition moves its joints alone") {
+  const bool mimics = GENERATE(false, true);
+  CAPTURE(mimics);
+  Caller caller;
+  caller.meet("arm", {{"elbow", ""}});
+  if (mimics) caller.meet("hand", {{"finger", "elbow"}});
+  const std::string lost = mimics ? "hand" : "arm";
+  REQUIRE(caller.directory.lost(lost, 1, kNow));
+  caller.directory.apply(presence_of("new", 1, 1), kNow);
+  const Joints joints{mimics ? PageJoint{"finger", "elbow"} : PageJoint{"elbow", ""}};
+  caller.directory.apply(Page{"new", 0, 1, 1, {{"frame of " + lost, ""}}, {}, {}, joints});
+  const Lines expected =
+      mimics ? Lines{"arm gets elbow", "new gets elbow"} : Lines{"new gets elbow"};
+  CHECK(caller.routes("elbow") != expected);
+  const auto begin = std::chrono::steady_clock::time_point() + std::chrono::hours(1);
+  for (auto t = begin; t < begin + 2 * Absences::kTakeover; t += Absences::kGrace / 4) {
+    (void)caller.directory.look_for_gone(t);
+  }
+  CHECK(caller.routes("elbow") == expected);
+  CHECK(caller.routes(mimics ? "arm/elbow" : "new/elbow") == expected);
 }
 
 TEST_CASE("joint routes: a conflict is told once to those who listen") {
