@@ -57,10 +57,9 @@ Result<ReplayedPartition> ReplayedPartition::open(const std::string& name, const
     FrameSpec spec{frame.id, frame.parent, {}};
     Edge edge{frame.parent, false, Correlation()};
     if (known[i] != nullptr) {
-      const bool of_sample = known[i]->of_sample();
-      spec.X_PC = of_sample ? whole(*known[i]) : known[i]->X_PC;
-      if (!of_sample) spec.correlation = replayed(known[i]->correlation);
+      spec.correlation = correlation_of(*known[i], frame.id, edge);
       edge.correlation = spec.correlation;
+      spec.X_PC = served_as(*known[i], edge);
       // Until its sample is applied, a dynamic edge has no value that would hold for all times.
       const bool moves = known[i]->stamp || known[i]->unsampled;
       const Covariance noise = known[i]->begins.value_or(Covariance());
@@ -181,6 +180,21 @@ void ReplayedPartition::clear(const std::string& id, const WatchedValue& value, 
   (void)node_.clear_history(id);
 }
 
+Correlation ReplayedPartition::correlation_of(const WatchedValue& value, const std::string& id,
+                                              Edge& edge) {
+  const auto& tied = value.correlation.observed_with;
+  const bool of_others =
+      std::any_of(tied.begin(), tied.end(), [&](const std::string& other) { return other != id; });
+  Correlation said = replayed(value.correlation);
+  if (value.of_sample() && of_others) {
+    const std::vector<CommonError> all = std::exchange(said.common_errors, {});
+    if (edge.correlation) said = *edge.correlation;
+    if (!all.empty()) edge.untied_until = *value.stamp + EdgeTiming().span;
+  }
+  said.unknown = value.correlation.unknown || (value.stamp && *value.stamp <= edge.untied_until);
+  return said;
+}
+
 void ReplayedPartition::say(const std::string& id, Correlation correlation, Edge& edge) {
   if (edge.correlation && correlation == *edge.correlation) return;
   if (node_.correlate(id, correlation)) edge.correlation = std::move(correlation);
@@ -200,9 +214,9 @@ void ReplayedPartition::rewrite(const std::string& id, const ValuesNews& values,
     const WatchedValue& value = values.values[i];
     if (value.frame == begin.frame && value.stamp) told.push_back(&value);
   }
-  const auto last = std::find_if(told.rbegin(), told.rend(),
-                                 [](const WatchedValue* value) { return !value->of_sample(); });
-  if (last != told.rend()) say(id, replayed((*last)->correlation), edge);
+  Correlation said;
+  for (const WatchedValue* value : told) said = correlation_of(*value, id, edge);
+  say(id, std::move(said), edge);
   std::vector<EdgeSample> samples;
   for (const WatchedValue* value : told)
     samples.push_back({*value->stamp, served_as(*value, edge)});
@@ -227,12 +241,9 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
     const auto served = served_.find(frame.id);
     if (served == served_.end() || frame.parent.empty()) continue;
     Edge& edge = served->second;
-    Correlation correlation = replayed(value.correlation);
-    const bool of_sample = value.of_sample();
-    const auto correlates = [&] {
-      return !of_sample && (!edge.correlation || !(correlation == *edge.correlation));
-    };
-    const bool plain = !correlates() && !value.begins && !value.cleared;
+    Correlation correlation = correlation_of(value, frame.id, edge);
+    const bool correlates = !edge.correlation || !(correlation == *edge.correlation);
+    const bool plain = !correlates && !value.begins && !value.cleared;
     if (!plain || value.stamp != stamp_) {
       if (auto ok = flush(); !ok) return ok;
     }
@@ -252,7 +263,7 @@ Result<void> ReplayedPartition::apply(const ValuesNews& values) {
       continue;
     }
     if (value.begins) begin(frame, value, edge);
-    if (!of_sample) say(frame.id, std::move(correlation), edge);
+    say(frame.id, std::move(correlation), edge);
     if (!value.stamp && edge.dynamic) continue;
     edge.dynamic = value.stamp.has_value();
     batch_.push_back({frame.id, served_as(value, edge)});

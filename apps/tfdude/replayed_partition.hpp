@@ -41,12 +41,18 @@ class ReplayedPartition {
     std::string parent;
     bool dynamic = false;
     std::optional<Correlation> correlation{};  // absent: not known
+    Time untied_until = Time::min();           // has samples whose correlation is not said
   };
 
   explicit ReplayedPartition(Node node) : node_(std::move(node)) {}
   void settle(const ValuesNews& values);
   [[nodiscard]] bool place(const WatchedFrame& frame, const WatchedValue* value);
   void begin(const WatchedFrame& frame, const WatchedValue& value, Edge& edge);
+  /// What is said of the edge with this value. An edge that drifts has it with each sample, which
+  /// names itself. What observations have left of a sample is said of no other one: its correlation
+  /// is unknown, as long as the sample is kept.
+  [[nodiscard]] static Correlation correlation_of(const WatchedValue& value, const std::string& id,
+                                                  Edge& edge);
   /// Says how the edge is correlated, if that is another way than before.
   void say(const std::string& id, Correlation correlation, Edge& edge);
   /// With all of its covariance: only that of a sample says how that sample is correlated.

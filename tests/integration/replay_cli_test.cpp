@@ -127,6 +127,58 @@ TEST_CASE("replay: the partitions are served as they were recorded, at the recor
   CHECK_THAT(result.out, ContainsSubstring("replayed") && !ContainsSubstring("rejected"));
 }
 
+// An edge that drifts says how it is correlated with each sample. What an observation has left of a
+// sample is said of this one only, so in a replay its relation to other edges is unknown.
+TEST_CASE("replay: no path is more certain than it was recorded") {
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/drift.mcap";
+  auto writer = RecordingWriter::create(file, at(kBegin));
+  REQUIRE(writer);
+  const auto add = [&](auto what, double time) {
+    REQUIRE(writer->add(PartitionNews{"base", std::move(what)}, at(time)));
+  };
+  const CommonError mount{"mount", false, Loading::Constant(6, 1, 0.01)};
+  const CommonError seen{"observed:1", false, Loading::Constant(6, 1, 0.01)};
+  add(ReachNews{true, ""}, kBegin);
+  add(FramesNews{{{"camera", "odom"}, {"mark", "odom"}, {"odom", "world"}, {"world", ""}}, 5},
+      kBegin);
+  const Covariance walk = shifted(0, 0.001).covariance.of_specified();
+  WatchedValue drifting{2, at(kBegin), shifted(0, 0.01), {false, {mount}, {"odom"}}, walk};
+  drifting.drifts = true;
+  add(ValuesNews{1,
+                 {{0, std::nullopt, shifted(0, 0.02), {false, {mount}, {}}, Covariance()},
+                  {1, at(kBegin), shifted(0, 0.02), {}, Covariance()},
+                  drifting}},
+      kBegin);
+  for (int i = 1; i <= 100; ++i) {
+    const double time = kBegin + 0.1 * i;
+    WatchedValue mark{1, at(time), shifted(0, 0.02)};
+    if (i == 50) mark.correlation = {false, {seen}, {"mark", "odom"}};
+    add(ValuesNews{1U + static_cast<unsigned>(i),
+                   {mark, {2, at(time), shifted(0, 0.01), {false, {mount}, {"odom"}}}}},
+        time);
+  }
+  REQUIRE(writer->finish(at(kEnd)));
+
+  const TestDomain domain;
+  Process replay = domain.start_cli({"replay", file, "--rate", "4"});
+  auto client = Client::open(external(domain));
+  REQUIRE(client);
+  REQUIRE(eventually([&] { return has_frame(*client, "camera") && has_frame(*client, "mark"); }));
+  const auto variance = [&](const char* frame, double time) {
+    Query query;
+    query.at = at(time);
+    const auto X = client->lookup("world", frame, query, 20s);
+    return X.value().covariance.of_specified().matrix()(0, 0);
+  };
+  // Both have the error of the mount: (0.01 + 0.01)².
+  CHECK(std::abs(variance("camera", kBegin + 3) - (1e-4 + 4e-4 + 4e-4)) < 1e-12);
+  // Nothing is known to tie the sample with the edge above: (√(2e-4) + √(5e-4))².
+  CHECK(std::abs(variance("mark", kBegin + 5) - std::pow(std::sqrt(2e-4) + std::sqrt(5e-4), 2)) <
+        1e-12);
+  testing::finish(replay);
+}
+
 TEST_CASE("replay: it pauses, and begins anywhere") {
   const TemporaryDirectory directory;
   const std::string file = written(directory);
