@@ -1,10 +1,15 @@
 #include "partition/observed_instants.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "tfdude/types/joint_spec.hpp"
@@ -40,6 +45,20 @@ void count_twice(std::vector<ObservedEdge>& edges, const std::string& source) {
       if (of_instants || one.source == source) one.loading *= std::sqrt(2.0);
     }
   }
+}
+
+// The newest instant of which errors are left, as in their names; empty: there is none.
+std::string newest_instant(const std::vector<ObservedEdge>& edges) {
+  std::optional<std::int64_t> newest;
+  for (const ObservedEdge& edge : edges) {
+    for (const CommonError& one : edge.X_PC.common_errors) {
+      const std::string_view text = instant_in(one.source);
+      std::int64_t instant = 0;
+      const auto read = std::from_chars(text.data(), text.data() + text.size(), instant);
+      if (read.ec == std::errc()) newest = std::max(newest.value_or(instant), instant);
+    }
+  }
+  return newest ? std::to_string(*newest) : std::string();
 }
 
 // If one observation has taken a source for that of an instant, its error was the source's.
@@ -134,7 +153,9 @@ void ObservedInstants::name_between(std::vector<ObservedEdge>& edges) {
 
 // What is merged counts as independent: that is enough for any relation of errors at one instant.
 void ObservedInstants::merge_others(std::vector<ObservedEdge>& edges) const {
-  const std::string here = path_.stamp ? std::to_string(nanoseconds(*path_.stamp)) : std::string();
+  // A path of static edges has no instant. The next observation may be of the newest one again.
+  const std::string here =
+      path_.stamp ? std::to_string(nanoseconds(*path_.stamp)) : newest_instant(edges);
   std::map<std::pair<std::string, std::string>, std::set<std::string>> names;  // of what is merged
   const auto of = [](const std::string& name) {
     return std::pair(std::string(said_source(name)), std::string(instant_in(name)));

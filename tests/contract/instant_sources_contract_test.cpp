@@ -185,6 +185,14 @@ TEST_CASE("instants: edges of several owners with one source share its error at 
   check_honest(ratios({{"left", 5}, {"left", 3}, {"right", 3}}, kAll), 30);
 }
 
+TEST_CASE("instants: an observation of static edges keeps an error that of its instant") {
+  for (const char* then : {"left", "right", "world", "post"}) {
+    INFO("then from " << then);
+    check_honest(ratios({{"left", 5}, {"post", 5}, {then, 5}}, kAll), 8);
+    check_honest(ratios({{"left", 3}, {"left", 5}, {"post", 5}, {then, 5}}, kAll), 8);
+  }
+}
+
 TEST_CASE("instants: a source that also a static edge names is one error for all time") {
   const std::vector<Asked> asked = {
       {"left", "object", 5}, {"world", "object", 5}, {"post", "object", 5}, {"left", "object", 4}};
