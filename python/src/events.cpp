@@ -191,6 +191,10 @@ void bind_events(py::module_& module, ClientClass& cls) {
            "Afterwards the listener is not running and will not run. Waits for a call under way.")
       .def("__enter__", [](py::object self) { return self; })
       .def("__exit__", [](Listening& self, const py::args&) { self.end(); });
+  py::class_<EndableCall>(module, "_Call")
+      .def(py::init<>())
+      .def("run", &EndableCall::run)
+      .def("end", &EndableCall::end);
   py::class_<Waiting>(module, "_PendingLookup").def("cancel", &Waiting::end);
   cls.def("on_change", &on_change, py::arg("listener"),
           "Calls a function with each later Change of the structure, one at a time, from a thread\n"

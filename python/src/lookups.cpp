@@ -151,11 +151,10 @@ void bind_own(ClientClass& cls) {
         query.over = to_duration(over, "over");
         Query middle;
         middle.at = query.at;
-        const auto ready = [&](Milliseconds left) {
-          return wait_for_lookup(session, a, b, middle, left);
-        };
-        return value_of(call_when_ready(session, to_milliseconds(timeout, "timeout"), ready,
-                                        [&](Client& c) { return c.velocity(a, b, query); }));
+        return value_of(value_after_wait(
+            session, to_milliseconds(timeout, "timeout"),
+            [&](Client& c, Milliseconds slice) { return c.velocity(a, b, query, slice); },
+            [&](const Error& error) { return is_worth_waiting(error.code, middle); }));
       },
       py::arg("a"), py::arg("b"), py::arg("at") = py::none(), py::kw_only(), py::arg("over") = 0.1,
       py::arg("timeout") = 0.0,

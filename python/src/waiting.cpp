@@ -1,12 +1,29 @@
 #include "waiting.hpp"
 
 #include <future>
+#include <stdexcept>
 
 namespace tfdude::python {
+
+namespace {
+
+thread_local const std::atomic<bool>* call_ended = nullptr;
+
+}  // namespace
 
 void check_interrupted() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   check_usable();
+  if (call_ended != nullptr && *call_ended) throw std::runtime_error("the call was cancelled");
+}
+
+py::object EndableCall::run(const py::function& call) const {
+  struct Within {
+    explicit Within(const std::atomic<bool>& ended) { call_ended = &ended; }
+    ~Within() { call_ended = nullptr; }
+  };
+  const Within within(ended_);
+  return call();
 }
 
 // As the library's own, of which only installed headers are seen here.

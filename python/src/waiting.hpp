@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <thread>
@@ -24,8 +25,21 @@ template <class Duration>
                                                        Milliseconds wait);
 
 /// Ends a wait without the GIL that looks for these once in a while.
-/// @throws what a signal raises; SystemExit if the interpreter ends
+/// @throws what a signal raises; SystemExit if the interpreter ends; RuntimeError if this thread's
+///   call was ended
 void check_interrupted();
+
+/// A call for asyncio, on a thread of its own, whose waits another thread can end.
+class EndableCall {
+ public:
+  [[nodiscard]] py::object run(const py::function& call) const;
+  /// From now on check_interrupted() throws within the call.
+  void end() { ended_ = true; }
+
+ private:
+  std::atomic<bool> ended_{false};
+};
+
 /// The error of the last slice of a wait, which names the time of the whole.
 [[nodiscard]] Error of_whole_wait(Error error, Milliseconds slice, Milliseconds wait);
 /// Whether an owner, a frame or data that is missing may still come.

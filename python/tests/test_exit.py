@@ -106,6 +106,25 @@ def test_exit_during_asyncio():
     """)
 
 
+def test_calls_of_cancelled_tasks_do_not_hold_up_the_end():
+    run("""
+        import asyncio
+        from tfdude import aio
+        async def main():
+            async with aio.Client(client) as shared:
+                for wait in (shared.watch("base", "never", timeout=float("inf")),
+                             shared.lookup_many("base", ["never"], timeout=float("inf")),
+                             shared.can_lookup("base", "never", timeout=float("inf")),
+                             shared.velocity("base", "never", timeout=float("inf"))):
+                    try:
+                        await asyncio.wait_for(wait, 0.05)
+                        assert False
+                    except asyncio.TimeoutError:
+                        pass
+        asyncio.run(main())
+    """)
+
+
 def test_nothing_works_once_the_interpreter_ends():
     out = run(
         """

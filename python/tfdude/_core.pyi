@@ -14,6 +14,7 @@ class _HasNanoseconds(Protocol):
     def nanoseconds(self) -> int: ...
 
 _Self = TypeVar("_Self", bound=Client)
+_T = TypeVar("_T")
 _Doubles = npt.NDArray[np.float64]
 _Instant = int | float | _datetime.datetime | np.integer[Any] | _HasNanoseconds
 _Duration = float | _datetime.timedelta | _HasNanoseconds
@@ -516,6 +517,11 @@ class JointStream:
     def publish(
         self, positions: npt.ArrayLike, variances: npt.ArrayLike | None = None, stamp: _Instant | None = None
     ) -> list[tuple[str, str, str]]: ...
+
+class _Call:
+    def __init__(self) -> None: ...
+    def run(self, function: Callable[[], _T]) -> _T: ...
+    def end(self) -> None: ...
 
 def _seconds(duration: _Duration, what: str) -> float: ...
 

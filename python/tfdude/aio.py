@@ -8,7 +8,7 @@
             ...
 
 Lookups wait without a thread, thousands at once, and end with their task. Each other call has a thread meanwhile, up to
-256 at once, and goes on until its end or timeout when its task is cancelled.
+256 at once. When its task is cancelled, its wait ends within 0.1 s; a change that is under way goes on.
 """
 
 from __future__ import annotations
@@ -105,4 +105,9 @@ class Client:
         return call
 
     async def _run(self, function: Callable[[], _T]) -> _T:
-        return await asyncio.get_running_loop().run_in_executor(self._pool, function)
+        call = _core._Call()
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._pool, call.run, function)
+        except asyncio.CancelledError:
+            call.end()
+            raise
