@@ -189,9 +189,11 @@ Correlation ReplayedPartition::correlation_of(const WatchedValue& value, const s
   if (value.of_sample() && of_others) {
     const std::vector<CommonError> all = std::exchange(said.common_errors, {});
     if (edge.correlation) said = *edge.correlation;
-    if (!all.empty()) edge.untied_until = *value.stamp + EdgeTiming().span;
+    if (!all.empty()) edge.untied = value.stamp;
   }
-  said.unknown = value.correlation.unknown || (value.stamp && *value.stamp <= edge.untied_until);
+  const bool keeps_untied =
+      edge.untied && value.stamp && *value.stamp - *edge.untied <= EdgeTiming().span;
+  said.unknown = value.correlation.unknown || keeps_untied;
   return said;
 }
 

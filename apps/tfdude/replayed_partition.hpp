@@ -41,7 +41,7 @@ class ReplayedPartition {
     std::string parent;
     bool dynamic = false;
     std::optional<Correlation> correlation{};  // absent: not known
-    Time untied_until = Time::min();           // has samples whose correlation is not said
+    std::optional<Time> untied{};              // its last sample whose correlation is not said
   };
 
   explicit ReplayedPartition(Node node) : node_(std::move(node)) {}

@@ -353,7 +353,7 @@ class Directory {
   void forget_use(const std::string& name, std::multiset<Owner> JointUse::*part, Owner owner);
   /// Whether it may own a frame; another partition may have all frames of one that is absent.
   [[nodiscard]] bool has_frames(Owner owner) const;
-  /// Those of several that have frames; none of these has joints otherwise.
+  /// Without those that others have left no frame, if there are several.
   [[nodiscard]] std::vector<Owner> living(const std::multiset<Owner>& owners) const;
   [[nodiscard]] Result<JointRoute> route_joint_of(Owner owner, const std::string& name) const;
   [[nodiscard]] static std::optional<Owner> mimicker_of(const JointUse& use);

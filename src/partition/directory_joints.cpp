@@ -68,7 +68,7 @@ bool Directory::has_frames(Owner owner) const {
                      [owner](const FrameInfo& frame) { return frame.owner == owner; });
 }
 
-// A lost partition has no joints any more if others own all its frames.
+// A lost partition has no joints any more, either, if others own all its frames.
 std::vector<Owner> Directory::living(const std::multiset<Owner>& owners) const {
   std::vector<Owner> all = distinct(owners);
   if (all.size() < 2) return all;
