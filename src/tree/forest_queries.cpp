@@ -27,7 +27,7 @@ Result<void> for_each_edge(const Ends& ends, Visit visit) {
   while (up != down) {
     const bool from_a = up->depth >= down->depth;
     const Version*& here = from_a ? up : down;
-    if (here->depth == 0) return not_connected(*ends.a, *ends.b);
+    if (here->depth == 0) return not_connected(ends);
     const Version* parent = Frames::at(*here->above, ends.commit);
     if (from_a) {
       visit(*here, *here, *parent);

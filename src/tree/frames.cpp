@@ -12,11 +12,33 @@ tl::unexpected<Error> unknown_end(std::string_view id) {
   return fail_about_frame(Errc::kUnknownEnd, "no frame " + quote(id) + " to end at", id);
 }
 
-tl::unexpected<Error> not_connected(const Version& a, const Version& b) {
-  return fail_about_frame(
+namespace {
+
+// A root, or a frame whose parent does not exist.
+const Version& top_above(const Version& frame, std::uint64_t commit) {
+  const Version* top = &frame;
+  while (top->depth > 0) top = Frames::at(*top->above, commit);
+  return *top;
+}
+
+}  // namespace
+
+tl::unexpected<Error> not_connected(const Ends& ends) {
+  const auto& [a, b, commit] = ends;
+  auto failed = fail_about_frame(
       Errc::kNotConnected,
-      "frames " + quote(a.name->text) + " and " + quote(b.name->text) + " have no common root",
-      a.name->text);
+      "frames " + quote(a->name->text) + " and " + quote(b->name->text) + " have no common root",
+      a->name->text);
+  for (const Version* end : {a, b}) {
+    const Version& top = top_above(*end, commit);
+    if (top.above == nullptr) continue;
+    Error& error = failed.value();
+    error.frame = Frames::at(*top.above, commit)->name->text;
+    error.message += ": frame " + quote(top.name->text) + " waits for its parent " +
+                     quote(error.frame) + ", which does not exist";
+    break;
+  }
+  return failed;
 }
 
 const Version* Frames::named(std::string_view id, std::uint64_t commit) const {

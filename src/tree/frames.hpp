@@ -19,7 +19,8 @@ struct Ends {
 
 [[nodiscard]] tl::unexpected<Error> unknown_start(std::string_view id);
 [[nodiscard]] tl::unexpected<Error> unknown_end(std::string_view id);
-[[nodiscard]] tl::unexpected<Error> not_connected(const Version& a, const Version& b);
+/// Names the parent that a frame waits for, if that is why.
+[[nodiscard]] tl::unexpected<Error> not_connected(const Ends& ends);
 
 /// What readers of a forest see: the slot of each id, the versions of each slot, and the number of
 /// the newest commit.

@@ -60,7 +60,7 @@ Result<void> walk(const Ends& ends, PathLookup::Absent absent, Order order, Othe
     const Version*& here = from_a ? a : b;
     const bool top =
         absent == PathLookup::Absent::kEnds ? here->depth == 0 : here->above == nullptr;
-    if (top) return not_connected(*ends.a, *ends.b);
+    if (top) return not_connected(ends);
     PathAccumulation<Value>& path = from_a ? path_a : path_b;
     if (here->held()) {
       if (!error) {

@@ -17,6 +17,7 @@ namespace tfdude {
 namespace {
 
 using testing::along_x;
+using testing::ContainsSubstring;
 using testing::eventually;
 
 Time at(int ms) { return Time(std::chrono::seconds(1'000'000)) + Milliseconds(ms); }
@@ -99,6 +100,12 @@ TEST_CASE("errors: a frame that nobody has, and a partition that is gone, are na
   const Error apart = error_of(world.client.lookup("hand", "island", Query{}));
   CHECK(apart.code == Errc::kNotConnected);
   CHECK(apart.frame == "hand");
+  const Node sea = Node::open(world.join("sea"), "sea", {{"pole", "raft", {}}}).value();
+  REQUIRE(eventually([&] { return world.client.exists("pole"); }));
+  const Error waits = error_of(world.client.lookup("hand", "pole", Query{}));
+  CHECK(waits.code == Errc::kNotConnected);
+  CHECK(waits.frame == "raft");
+  CHECK_THAT(waits.message, ContainsSubstring("'pole' waits for its parent 'raft'"));
   { const Node gone = std::move(world.arm); }
   Result<StampedTransform> lost = tl::unexpected(Error{Errc::kNotYet, {}});
   CHECK(eventually([&] {
