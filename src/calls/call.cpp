@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "tfdude/base/id.hpp"
+
 #include "partition/requests.hpp"
 
 namespace tfdude {
@@ -10,6 +12,9 @@ namespace {
 
 // Before a call that was denied is planned again; then twice as long.
 constexpr Milliseconds kFirstPause{5};
+
+// So long an error about something missing waits for a partition that tells just now what it has.
+constexpr Milliseconds kArrivesWithin{1000};
 
 // An owner that hangs has the request, and cannot know that nobody waits for its answer any more.
 void say_what_may_follow(const Part& part, Reply& reply) {
@@ -48,12 +53,17 @@ void Call::plan(const Directory& directory, std::uint64_t version, bool certain,
                 Clock::time_point now) {
   changed_ = attempts_ > 0 && (changed_ || version != version_);
   version_ = version;
+  find_restarted(directory);
   auto planned = task_.plan(directory, now);
-  if (planned) return ask();
+  if (planned) {
+    note_processes(directory);
+    return ask();
+  }
   const Errc code = planned.error().code;
   const bool may_exist = may_appear(code);
   // The answer of others is certain about frames, but not about partitions.
-  const bool known = !may_exist || certain || (asks_ && code != Errc::kUnknownPartition);
+  const bool known = !may_exist || (certain && !awaits_arrival(directory, now)) ||
+                     (asks_ && code != Errc::kUnknownPartition);
   if (!known && !limit_.over(now)) {
     state_ = State::kDiscover;
   } else if (asks_ && !fresh_ && !limit_.over(now)) {
@@ -62,6 +72,26 @@ void Call::plan(const Directory& directory, std::uint64_t version, bool certain,
     finish(std::move(planned), !may_exist ? Certainty::kFinal
                                : known    ? Certainty::kKnown
                                           : Certainty::kUndecided);
+  }
+}
+
+bool Call::awaits_arrival(const Directory& directory, Clock::time_point now) {
+  if (!directory.arriving()) return false;
+  if (!arrives_by_) arrives_by_ = now + kArrivesWithin;
+  return now < *arrives_by_;
+}
+
+void Call::note_processes(const Directory& directory) {
+  if (!task_.changes() || !asked_.empty()) return;
+  for (const Part& part : task_.parts()) {
+    if (part.owner == kHeldHere) continue;
+    asked_.push_back({part.owner, part.partition, directory.process(part.owner)});
+  }
+}
+
+void Call::find_restarted(const Directory& directory) {
+  for (const Asked& one : asked_) {
+    if (directory.process(one.owner) != one.process) restarted_ = one.partition;
   }
 }
 
@@ -178,6 +208,14 @@ void Call::pause(Clock::time_point until, std::optional<std::uint64_t> awaits) {
 
 void Call::finish(Result<void> outcome, Certainty certainty) {
   outcome_ = std::move(outcome);
+  // What is there already may have been made by this call.
+  if (!outcome_ && outcome_.error().code == Errc::kAlreadyExists && !restarted_.empty()) {
+    outcome_ = fail_about_partition(Errc::kUnreachable,
+                                    "partition " + quote(restarted_) +
+                                        " was restarted before it answered; it may have " +
+                                        "applied the change: " + outcome_.error().message,
+                                    restarted_);
+  }
   certainty_ = certainty;
   requests_.reset();
   state_ = State::kOver;

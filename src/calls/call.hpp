@@ -139,6 +139,12 @@ class Call {
   [[nodiscard]] Certainty certainty() const { return certainty_; }
 
  private:
+  /// Whether a partition tells just now what it has, and that is not awaited for too long.
+  [[nodiscard]] bool awaits_arrival(const Directory& directory, Clock::time_point now);
+  /// Which processes are asked for a change; another one cannot know what the former has applied.
+  void note_processes(const Directory& directory);
+  void find_restarted(const Directory& directory);
+
   struct Change {  // that an owner has acknowledged
     Owner owner;
     std::string partition;
@@ -169,6 +175,14 @@ class Call {
   bool own_ = false;  // a change was made here that must be stored
   std::vector<std::string> late_;
   bool outdates_ = false;
+  std::optional<Clock::time_point> arrives_by_;
+  struct Asked {
+    Owner owner;
+    std::string partition;
+    std::uint64_t process;
+  };
+  std::vector<Asked> asked_;  // for a change, at first
+  std::string restarted_;     // one of them that has another process now; empty: none
   int attempts_ = 0;
   bool changed_ = false;  // the structure, since the first of them
   Milliseconds pause_;

@@ -92,14 +92,21 @@ void ChangeLog::partition_up(const std::string& partition, const std::string& ho
 }
 
 void ChangeLog::partition_down(const std::string& partition, bool stopped) {
+  down(partition, stopped ? " was stopped" : " is lost: it no longer sends", stopped);
+}
+
+void ChangeLog::partition_replaced(const std::string& partition) {
+  down(partition, " is lost: another process has taken its place", false);
+}
+
+void ChangeLog::down(const std::string& partition, const char* what, bool stopped) {
   if (!watched_) return;
   add({ChangeKind::kPartitionDown,
        partition,
        {},
        {},
        {},
-       "partition " + quote(partition) +
-           (stopped ? " was stopped" : " is lost: it no longer sends"),
+       "partition " + quote(partition) + what,
        {},
        stopped});
 }

@@ -34,6 +34,8 @@ class ChangeLog {
 
   void partition_up(const std::string& partition, const std::string& host, std::uint32_t pid);
   void partition_down(const std::string& partition, bool stopped);
+  /// Another process serves it, and nobody has noticed that the former one is gone.
+  void partition_replaced(const std::string& partition);
   void frame_added(std::string_view id, std::string_view parent, const std::string& partition);
   void frame_moved(std::string_view id, std::string_view parent, const std::string& partition);
   /// @param before  the former owner, which is unreachable
@@ -47,6 +49,8 @@ class ChangeLog {
   [[nodiscard]] std::vector<Change> take() { return std::exchange(changes_, {}); }
 
  private:
+  void down(const std::string& partition, const char* what, bool stopped);
+
   bool watched_ = false;
   std::vector<Change> changes_;
 };

@@ -138,19 +138,25 @@ void Directory::apply(const Presence& presence, Time now) {
   if (drop_outdated(partition, presence.incarnation)) return;
   // An old message of a partition that has stopped since.
   if (partition.info.stopped && partition.live == presence.incarnation) return;
+  // Its end was not noticed. What it had and the new one has not is removed after this.
+  if (partition.told_up && *partition.told_up != presence.ticket) {
+    partition.told_up.reset();
+    changes_.partition_replaced(partition.info.name);
+  }
   if (std::exchange(partition.live, presence.incarnation) != presence.incarnation)
     partition.to_forget_all = false;
+  PartitionInfo& info = partition.info;
+  const bool known_to_be_up = info.reachable && partition.announced == presence.incarnation;
+  if (!known_to_be_up) ++version_;
+  if (!known_to_be_up || !partition.told_up) {
+    changes_.partition_up(info.name, presence.host, presence.pid);
+  }
+  partition.told_up = presence.ticket;
   if (Successor* successor = succeed(partition, presence.incarnation)) {
     successor->page_count = presence.pages;
     replace_if_complete(partition, owner);
   } else {
     partition.page_count = presence.pages;
-  }
-  PartitionInfo& info = partition.info;
-  const bool known_to_be_up = info.reachable && partition.announced == presence.incarnation;
-  if (!known_to_be_up) {
-    ++version_;
-    changes_.partition_up(info.name, presence.host, presence.pid);
   }
   partition.announced = presence.incarnation;
   info.host = presence.host;
@@ -242,6 +248,7 @@ void Directory::replace_if_complete(Known& partition, Owner owner) {
                    owner, number);
   }
   if (later) keep_for_return(partition, std::move(*later));
+  ++version_;
   claims_.mend();
   report(fresh, owner);
   for (const auto& [number, page] : pages) find_orphans(page.tombstones, owner);

@@ -184,6 +184,8 @@ class Directory {
   /// The epoch up to which this partition's structure is known here.
   [[nodiscard]] std::uint64_t epoch(Owner owner) const { return partitions_[owner].epoch; }
 
+  /// Numbers the latest process of a partition, as far as it is known.
+  [[nodiscard]] std::uint64_t process(Owner owner) const { return partitions_[owner].process(); }
   /// Whether what is known of the frames of a partition is of its process that lives.
   [[nodiscard]] bool is_of_live_process(Owner owner) const {
     const Known& partition = partitions_[owner];
@@ -197,6 +199,9 @@ class Directory {
   [[nodiscard]] const std::string* incomplete() const;
   /// Grows with each page that comes, and with each partition that is there for the first time.
   [[nodiscard]] std::uint64_t progress() const { return pages_heard_ + partitions_.size(); }
+  /// Whether a partition has come, or come back, of which nothing was known, and has not told all
+  /// that it has. O(partitions).
+  [[nodiscard]] bool arriving() const;
 
   /// An owner has announced a change that its structure shows in this epoch. @return whether it is
   /// the latest
@@ -261,13 +266,14 @@ class Directory {
   };
   struct Known {
     PartitionInfo info;
-    std::uint64_t live = 0;           // the latest incarnation heard
-    std::uint64_t announced = 0;      // the latest incarnation whose presence has come
-    std::uint64_t incarnation = 0;    // of the pages
-    std::uint64_t epoch = 0;          // up to which everything has come
-    std::uint64_t awaited_epoch = 0;  // will be complete once `awaited` has come
-    std::uint64_t told_epoch = 0;     // of an announced change
-    std::uint64_t told_by = 0;        // the process that has announced it
+    std::uint64_t live = 0;                // the latest incarnation heard
+    std::uint64_t announced = 0;           // the latest incarnation whose presence has come
+    std::optional<std::uint64_t> told_up;  // the ticket of the process that was reported as up
+    std::uint64_t incarnation = 0;         // of the pages
+    std::uint64_t epoch = 0;               // up to which everything has come
+    std::uint64_t awaited_epoch = 0;       // will be complete once `awaited` has come
+    std::uint64_t told_epoch = 0;          // of an announced change
+    std::uint64_t told_by = 0;             // the process that has announced it
     std::vector<PageEpoch> awaited;
     std::uint32_t page_count = 0;
     std::map<std::uint32_t, KeptPage> pages;

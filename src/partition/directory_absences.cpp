@@ -86,6 +86,7 @@ void Directory::mark_absent(Known& partition, Owner owner, bool stopped, Time no
   absences_.mark_absent(partition.info.name, partition.live, stopped, now, early);
   absences_.teller_gone(partition.info.name);
   end_silences(partitions_, absences_);
+  partition.told_up.reset();
   changes_.partition_down(partition.info.name, stopped);
   const auto missed = absences_.find(partition.info.name);
   const bool silent = !stopped && missed && missed->kind == Absent::Kind::kSilent;
@@ -354,6 +355,15 @@ std::optional<PartitionInfo> Directory::only_heard_of() const {
   const auto one = std::find_if(partitions_.begin() + 1, partitions_.end(), lacks);
   if (one == partitions_.end()) return std::nullopt;
   return one->info;
+}
+
+bool Directory::arriving() const {
+  if (without_pages_) return false;
+  return std::any_of(partitions_.begin() + 1, partitions_.end(), [](const Known& partition) {
+    // A successor leaves in force what was known.
+    if (!partition.info.reachable || partition.is_cut() || partition.successor) return false;
+    return partition.announced != partition.live || !partition.complete();
+  });
 }
 
 std::optional<Presence> Directory::serving(std::string_view partition) const {

@@ -197,6 +197,50 @@ TEST_CASE("a lost partition keeps its structure and is marked unreachable") {
   }
 }
 
+TEST_CASE("a process whose end nobody has noticed is reported as lost before the next one as up") {
+  Replica replica;
+  replica.directory.changes().watch();
+  const auto hear = [&](std::uint64_t incarnation, std::uint64_t ticket) {
+    Presence presence = presence_of("arms", incarnation, 1);
+    presence.ticket = ticket;
+    replica.directory.apply(presence, kNow);
+  };
+  const auto heard = [&] {
+    Lines lines;
+    for (const Change& one : replica.directory.changes().take()) {
+      lines.push_back(std::string(to_string(one.kind)) + " " + one.frame);
+    }
+    return lines;
+  };
+  hear(1, 11);
+  replica.directory.apply(page_of("arms", {{"arm", ""}, {"hand", "arm"}}));
+  CHECK(heard() == Lines{"partition_up ", "frame_added arm", "frame_added hand"});
+  SECTION("it comes as a new process with other frames") {
+    hear(2, 22);
+    replica.directory.apply(page_of("arms", {{"arm", ""}}, 2));
+    CHECK(heard() == Lines{"partition_down ", "partition_up ", "frame_removed hand"});
+    hear(2, 22);
+    CHECK(heard().empty());
+  }
+  SECTION("a page of the new process comes first") {
+    replica.directory.apply(page_of("arms", {{"arm", ""}}, 2));
+    hear(2, 22);
+    CHECK(heard() == Lines{"partition_down ", "partition_up ", "frame_removed hand"});
+  }
+  SECTION("one process goes on with a higher number") {
+    hear(2, 11);
+    CHECK(heard() == Lines{"partition_up "});
+  }
+  SECTION("its end was noticed") {
+    REQUIRE(replica.directory.lost("arms", 1, kLater));
+    CHECK(heard() == Lines{"partition_down "});
+    // A page alone makes it reachable.
+    replica.directory.apply(page_of("arms", {{"arm", ""}, {"hand", "arm"}}, 2));
+    hear(2, 22);
+    CHECK(heard() == Lines{"partition_up "});
+  }
+}
+
 TEST_CASE("the loss of an unknown partition or of an earlier incarnation is ignored") {
   Replica replica;
   CHECK_FALSE(replica.directory.lost("arms", 1, kNow));

@@ -4,9 +4,12 @@
 
 #include <atomic>
 #include <functional>
+#include <future>
+#include <string>
 #include <thread>
 
 #include "support/catch.hpp"
+#include "support/forest_support.hpp"
 #include "support/replica.hpp"
 #include "support/rig.hpp"
 
@@ -15,6 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::ContainsSubstring;
+using testing::outcome;
 using testing::quick;
 
 /// A transport that may not have discovered all participants yet.
@@ -123,6 +127,28 @@ TEST_CASE("discovery: an operation is repeated until its missing frame has arriv
   other.join();
   CHECK(found);
   CHECK(tries > 1);
+}
+
+TEST_CASE("discovery: what a partition has that comes later is waited for, but not for long") {
+  Joiner joiner;
+  REQUIRE(joiner.rig.discovery.await(Deadline(10s)));
+  joiner.rig.on_presence(testing::presence_of("arm", 1, 1));
+  const auto find = [&](const std::string& id) {
+    return joiner.rig.requests.find(Deadline(30s), [&](const Directory&) -> Result<int> {
+      if (joiner.rig.structure.forest.exists(id)) return 1;
+      return missing();
+    });
+  };
+  SECTION("it comes") {
+    auto hand = std::async(std::launch::async, [&] { return find("hand"); });
+    CHECK(hand.wait_for(20ms) == std::future_status::timeout);
+    joiner.rig.on_page(Page{"arm", 0, 1, 1, {{"hand", "", 1}}});
+    CHECK(hand.get());
+    const auto begin = Deadline::Clock::now();
+    CHECK(outcome(find("finger")) == "unknown_frame");
+    CHECK(Deadline::Clock::now() - begin < 500ms);
+  }
+  SECTION("it does not come") { CHECK(outcome(find("hand")) == "unknown_frame"); }
 }
 
 TEST_CASE("discovery: an error that more discovery cannot change is returned at once") {

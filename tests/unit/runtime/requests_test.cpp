@@ -15,6 +15,7 @@
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
 #include "support/process.hpp"
+#include "support/replica.hpp"
 #include "support/rig.hpp"
 
 namespace tfdude {
@@ -122,6 +123,38 @@ TEST_CASE("requests: an owner that does not know a parent yet is asked until it 
   Rig rig(network.join());
   CHECK(outcome(add_finger(rig, Deadline(30s))) == "ok");
   CHECK(denied.size() == 4);
+}
+
+TEST_CASE("requests: an owner that restarts before it answers may have applied the change") {
+  LoopbackNetwork network;
+  Rig* caller = nullptr;
+  std::uint64_t process = 0;
+  ScriptedOwner arm(
+      network, "arm", kArm, [&](Transport& transport, const PeerId& from, const Request& request) {
+        caller->on_presence(testing::presence_of("arm", process, 1));
+        caller->on_page(
+            {"arm", 0, process, 1, {{"arm", "", 1}, {"hand", "arm", 1}, {"finger", "hand", 1}}});
+        transport.reply(from,
+                        {request.sequence, 0, Error{Errc::kAlreadyExists, "'finger' exists"}});
+        return true;
+      });
+  Rig rig(network.join());
+  REQUIRE(rig.discovery.await(Deadline(10s)));
+  caller = &rig;
+  const auto number = [&] {
+    const Lock lock(rig.structure.mutex);
+    return rig.structure.directory.serving("arm")->incarnation;
+  };
+  SECTION("another process answers") {
+    process = number() + 1;
+    const auto added = add_finger(rig, Deadline(10s));
+    REQUIRE(outcome(added) == "unreachable");
+    CHECK_THAT(added.error().message, ContainsSubstring("'arm' was restarted before it answered"));
+  }
+  SECTION("the same process answers: somebody else has added the frame") {
+    process = number();
+    CHECK(outcome(add_finger(rig, Deadline(10s))) == "already_exists");
+  }
 }
 
 TEST_CASE("requests: a change that is acknowledged but does not arrive is not denied") {
