@@ -151,10 +151,12 @@ void bind_path(py::module_& module, ClientClass& client) {
       py::arg("at") = py::none(), py::kw_only(), py::arg("extrapolate") = 0.0,
       py::arg("age_noise_until") = py::none(), py::arg("order") = 2,
       "As Client.lookup(), from the received values.");
-  cls.def("wait_next", &wait_next, py::arg("timeout") = 1.0,
-          "Waits for a value that this object has not returned yet: the first time for the newest\n"
-          "one. Values between two calls are not kept. Raises TimeoutException after timeout [s],\n"
-          "TransformException once the client is closed.");
+  cls.def(
+      "wait_next", &wait_next, py::arg("timeout") = 1.0,
+      "Waits for a value that this object has not returned yet: the first time for the newest\n"
+      "one. Values between two calls are not kept. Raises TimeoutException after timeout [s],\n"
+      "TransformException once the client is closed. The end of the path is raised at once, and\n"
+      "by the next call, which waits for its return, after timeout.");
   cls.def(
       "on_value", &on_value, py::arg("callback"),
       "Calls a function with the newest transform, and then when there is another one, from a\n"

@@ -125,17 +125,22 @@ def test_messages_name_the_time_of_the_whole_wait(client):
         client.wait_until(client.now() + 10**15, 0.12)
 
 
-def test_wait_next_says_at_once_that_its_path_has_ended(client, node):
+def test_wait_next_says_at_once_that_its_path_has_ended_and_then_waits_for_its_return(client, node):
     watch = client.watch("base", "tool", timeout=10)
     watch.wait_next(10)
     removing = threading.Timer(0.1, node.remove, ["tool"])
     removing.start()
-    for _ in range(2):
-        begin = time.monotonic()
-        with pytest.raises(tfdude.LookupException):
-            watch.wait_next(20)
-        assert time.monotonic() - begin < 10
+    begin = time.monotonic()
+    with pytest.raises(tfdude.LookupException):
+        watch.wait_next(20)
+    assert time.monotonic() - begin < 10
     removing.join()
+    begin = time.monotonic()
+    with pytest.raises(tfdude.LookupException):
+        watch.wait_next(0.3)
+    assert time.monotonic() - begin >= 0.3
+    node.add("tool", "arm", tfdude.Transform())
+    watch.wait_next(20)
 
 
 def ends_with_the_client(client, wait):

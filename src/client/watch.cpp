@@ -1,5 +1,8 @@
 #include "tfdude/client/watch.hpp"
 
+#include <optional>
+#include <utility>
+
 #include "runtime/deadline.hpp"
 #include "runtime/watched_path.hpp"
 
@@ -26,15 +29,16 @@ bool PathWatch::wait_for_more(std::uint64_t messages,
 
 Result<StampedTransform> PathWatch::wait_next(Milliseconds wait) {
   const Deadline deadline(wait);
-  for (bool more = returned_.has_value();; more = true) {
+  while (true) {
     const WatchedPath::Heard heard = path_->heard();
     auto newest = latest();
     if (newest && !(returned_ && is_same_value(*returned_, *newest))) {
       returned_ = *newest;
       return newest;
     }
-    // Once the client has ended there is nothing to wait for.
-    if (!newest && (more || newest.error().code == Errc::kTransport)) return newest;
+    // Each end is told once; the path may return. That of the client is for good.
+    const bool ends = !newest && std::exchange(returned_, std::nullopt).has_value();
+    if (ends || (!newest && newest.error().code == Errc::kTransport)) return newest;
     if (path_->wait_for_news(heard, deadline.at())) continue;
     if (auto ended = path_->ended()) return tl::unexpected(*std::move(ended));
     if (!newest) return newest;

@@ -30,6 +30,12 @@ struct KnownStructure {
   return std::chrono::nanoseconds(rate > 0 ? std::llround(1e9 / rate) : 0);
 }
 
+/// Whether an owner that has denied values so would deny them again, so that the next renewal is
+/// soon enough.
+[[nodiscard]] inline bool would_deny_again(Errc code) {
+  return code == Errc::kNotPermitted || code == Errc::kTooMuch || code == Errc::kUnsupported;
+}
+
 /// Something that is watched at its owners: what differs between a path and a partition.
 /// WatchRounds does what they have in common.
 /// @par Thread safety  All functions are thread-safe; those of rounds are called by one thread.

@@ -57,6 +57,12 @@ Result<void> WatchedPartition::plan(const KnownStructure& known) {
   if (auto ready = route_to(known.directory, *owner, {}); !ready) {
     return tl::unexpected(std::move(ready.error()));
   }
+  // Until all of a new process has come, its predecessor's frames are in force.
+  if (*owner != kHeldHere && !known.directory.is_of_live_process(*owner)) {
+    return fail_about_partition(
+        Errc::kUnreachable, "partition " + quote(name_) + " has restarted, and tells its frames",
+        name_);
+  }
   const auto serving = known.directory.serving(name_);
   planned_ = {*owner, {}, {}, 0};
   planned_.incarnation = *owner == kHeldHere ? known.own_incarnation
@@ -153,7 +159,7 @@ bool WatchedPartition::on_denied(const Part& /*part*/, const Error* why) {
   if (why == nullptr) return false;
   // More edges are correlated with others than an answer can have.
   if (why->code == Errc::kInvalidInput && most_ > kMaxCorrelated) most_ = kMaxCorrelated;
-  const bool lasts = why->code == Errc::kNotPermitted || why->code == Errc::kTooMuch;
+  const bool lasts = would_deny_again(why->code);
   if (lasts) deny(why->message);
   return lasts;
 }

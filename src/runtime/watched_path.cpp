@@ -247,9 +247,12 @@ void WatchedPath::collect() {
 }
 
 void WatchedPath::interrupt(Error why) {
+  bool is_news = false;
   {
     const Lock lock(mutex_);
-    if (live()) ends_.fetch_add(1, std::memory_order_relaxed);
+    const bool was_live = live();
+    if (was_live) ends_.fetch_add(1, std::memory_order_relaxed);
+    is_news = was_live || ended_ || why.code != why_not_.code || why.frame != why_not_.frame;
     why_not_ = std::move(why);
     next_.reset();
     memory_.store(nullptr, std::memory_order_seq_cst);
@@ -257,7 +260,7 @@ void WatchedPath::interrupt(Error why) {
     show(nullptr);
     forget_newest();
   }
-  tell();
+  if (is_news) tell();
 }
 
 bool WatchedPath::up_to_date() const {
@@ -357,7 +360,7 @@ bool WatchedPath::on_no_plan(Error why, Clock::time_point now) {
   }
   if (was_live) report(why.message);
   interrupt(std::move(why));
-  return false;
+  return true;
 }
 
 bool WatchedPath::on_deaf(Error why) {
@@ -366,11 +369,17 @@ bool WatchedPath::on_deaf(Error why) {
 }
 
 bool WatchedPath::on_denied(const Part& part, const Error* why) {
-  if (live()) return false;
-  interrupt(why != nullptr ? *why
-                           : Error{Errc::kNotOwner, "partition " + quote(part.partition) +
-                                                        " has restarted, or cannot push"});
-  return false;
+  Error reason = why != nullptr ? *why
+                                : Error{Errc::kNotOwner, "partition " + quote(part.partition) +
+                                                             " has restarted, or cannot push"};
+  const bool lasts = would_deny_again(reason.code);
+  // Known values are still returned, with their stamps, but nothing renews them.
+  if (live()) {
+    set_health(tl::unexpected(std::move(reason)));
+  } else {
+    interrupt(std::move(reason));
+  }
+  return lasts;
 }
 
 void WatchedPath::end() {

@@ -161,6 +161,29 @@ TEST_CASE("waiting: wait_next() returns when the path or the client ends meanwhi
   CHECK(std::chrono::steady_clock::now() - begin < 10s);
 }
 
+TEST_CASE("waiting: the end of a path is told once, and its return is waited for") {
+  World world;
+  auto watch = world.client.watch("world", "base");
+  REQUIRE(watch);
+  REQUIRE(watch->wait_next(20s));
+  REQUIRE(world.node.remove("base"));
+  const auto gone = watch->wait_next(20s);
+  REQUIRE_FALSE(gone);
+  CHECK(gone.error().code == Errc::kUnknownEnd);
+  std::atomic<int> news{0};
+  const Subscription listening = watch->on_news([&] { ++news; });
+  const auto begin = std::chrono::steady_clock::now();
+  const auto still = watch->wait_next(300ms);
+  REQUIRE_FALSE(still);
+  CHECK(still.error().code == Errc::kUnknownEnd);
+  CHECK(std::chrono::steady_clock::now() - begin >= 300ms);
+  CHECK(news <= 1);
+  REQUIRE(world.node.add("base", "world", ahead(7)));
+  const auto back = watch->wait_next(20s);
+  REQUIRE(back);
+  CHECK(back->pose.translation().x() == 7);
+}
+
 TEST_CASE("waiting: wait_next() returns each new value once, and the newest of several") {
   World world;
   REQUIRE(world.node.update("base", ahead(1), instant(0)));

@@ -57,8 +57,9 @@ class TFDUDE_EXPORT PathWatch {
   /// between two calls are not queued; the newest is returned. So nothing is new while an owner of
   /// the path is gone: health() says which. One thread at a time; each copy of this object has its
   /// own place.
-  /// @return as latest(), with the reason as soon as the path or the client ends; kTimeout: nothing
-  ///   new within `wait`
+  /// @return as latest(), with the reason as soon as the path or the client ends. The end of a path
+  ///   is told once: the next call waits for its return, and has the reason at the end of `wait`.
+  ///   kTimeout: nothing new within `wait`
   [[nodiscard]] Result<StampedTransform> wait_next(Milliseconds wait);
 
   /// Calls a function with the newest value, if there is one, and then when there is another one,

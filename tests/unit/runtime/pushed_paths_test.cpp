@@ -1,8 +1,10 @@
 // Watched paths: the watcher's side and the owner's.
 
 #include <atomic>
+#include <chrono>
 #include <limits>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "runtime/watch_server.hpp"
@@ -83,6 +85,34 @@ TEST_CASE("watcher: a watch times out and names the owner that does not answer")
   CHECK(outcome(unanswered) == "timeout");
   CHECK_THAT(unanswered.error().message, ContainsSubstring("'arm'"));
   CHECK(outcome(rig.watcher.watch("arm", "foot", {})) == "unknown_end");
+}
+
+TEST_CASE("watcher: a watched path that its owner denies says why, and is asked for seldom") {
+  LoopbackNetwork network;
+  std::atomic<bool> denies{false};
+  std::atomic<int> denied{0};
+  ScriptedOwner arm(network, "arm", kArm,
+                    [&](Transport& transport, const PeerId& from, const Request& request) {
+                      if (!denies || !std::holds_alternative<WatchRequest>(request.body))
+                        return false;
+                      ++denied;
+                      transport.reply(from, {request.sequence, 0, Error{Errc::kTooMuch, "groups"}});
+                      return true;
+                    });
+  WatchingRig rig(network);
+  const auto path = rig.watcher.watch("arm", "hand", {});
+  REQUIRE(path);
+  CHECK((*path)->health());
+  denies = true;
+  REQUIRE(eventually([&] { return denied >= 1; }));
+  const auto begin = std::chrono::steady_clock::now();
+  REQUIRE(eventually([&] { return !(*path)->health(); }));
+  CHECK((*path)->health().error().code == Errc::kTooMuch);
+  CHECK(seen(**path) == 4);
+  REQUIRE(eventually([&] { return denied >= 2; }));
+  CHECK(std::chrono::steady_clock::now() - begin > 500ms);
+  denies = false;
+  CHECK(eventually([&] { return (*path)->health().has_value(); }));
 }
 
 TEST_CASE("watcher: a watched path follows a frame that is moved") {
