@@ -32,6 +32,17 @@ Result<void> outcome_of(const std::vector<Reply>& replies) {
   return outcome;
 }
 
+Result<void> outcome_of_telling(std::vector<Reply> replies) {
+  const auto may_not = [](const Reply& reply) {
+    const auto* error = std::get_if<Error>(&reply.body);
+    return error != nullptr && error->code == Errc::kNotPermitted;
+  };
+  if (!std::all_of(replies.begin(), replies.end(), may_not)) {
+    replies.erase(std::remove_if(replies.begin(), replies.end(), may_not), replies.end());
+  }
+  return outcome_of(replies);
+}
+
 void AppliedValues::note(const std::vector<Part>& parts, const std::vector<Reply>& replies) {
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (std::holds_alternative<Error>(replies[i].body)) continue;

@@ -18,6 +18,9 @@ namespace tfdude {
 /// may bring.
 [[nodiscard]] Result<void> outcome_of(const std::vector<Reply>& replies);
 
+/// The first error but kNotPermitted, which counts only if there is nothing else.
+[[nodiscard]] Result<void> outcome_of_telling(std::vector<Reply> replies);
+
 /// A task whose requests are planned by a function.
 /// @tparam Route  returns a Part, or all of them, or the error
 template <class Route>
@@ -81,6 +84,20 @@ class ChangeTask final : public RoutedTask<Route> {
 
  private:
   AppliedValues applied_;
+};
+
+/// Tells owners something that each passes on: it is done once one of them has it. Those whom the
+/// caller may not tell hear it from the others.
+template <class Route>
+class TellTask final : public RoutedTask<Route> {
+ public:
+  using RoutedTask<Route>::RoutedTask;
+
+  [[nodiscard]] bool changes() const override { return true; }
+  [[nodiscard]] Result<Task::Next> take(std::vector<Reply> replies,
+                                        Task::Clock::time_point) override {
+    return outcome_of_telling(replies).map([] { return Task::Next::kDone; });
+  }
 };
 
 /// Asks one owner for data of one kind.

@@ -88,6 +88,13 @@ class Requests final : public RequestLink {
     return run(task, deadline);
   }
 
+  /// Tells owners something that they pass on to the others (TellTask).
+  template <class Route>
+  [[nodiscard]] Result<void> tell(const Deadline& deadline, Route route) {
+    TellTask<Route> task(std::move(route));
+    return run(task, deadline);
+  }
+
   /// What one owner answers; empty: something else than it was asked for.
   template <class Answer, class Route>
   [[nodiscard]] Result<std::optional<Answer>> ask_one(const Deadline& deadline,

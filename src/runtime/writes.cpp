@@ -152,8 +152,8 @@ Result<void> Writes::forget(const std::string& partition) {
   const Deadline deadline = discovery_.call_deadline();
   // All reachable participants must be told.
   if (auto all = discovery_.await(deadline); !all) return all;
-  auto told = requests_.change(
-      deadline, {}, [&](const Directory& directory) { return route_forget(directory, partition); });
+  auto told = requests_.tell(
+      deadline, [&](const Directory& directory) { return route_forget(directory, partition); });
   return told ? member_.forget(partition) : told;
 }
 

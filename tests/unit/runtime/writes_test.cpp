@@ -191,6 +191,33 @@ TEST_CASE("writes: an unreachable partition is forgotten by all reachable partic
   CHECK(writer.structure.forest.exists("hand"));
 }
 
+TEST_CASE("writes: who may tell one owner that a partition is gone need not be able to tell all") {
+  LoopbackNetwork network;
+  bool denies_all = false;
+  const auto deny = [](Transport& transport, const PeerId& from, const Request& request) {
+    transport.reply(from, {request.sequence, 0, Error{Errc::kNotPermitted, "not yours"}});
+    return true;
+  };
+  ScriptedOwner arm(network, "arm", kArm, [&](Transport& t, const PeerId& from, const Request& r) {
+    return denies_all && deny(t, from, r);
+  });
+  const ScriptedOwner eye(network, "eye", {}, deny);
+  ScriptedOwner leg(network, "leg", kLeg);
+  Writer writer(network);
+  REQUIRE(writer.discovery.await(Deadline(10s)));
+  leg.leave();
+  SECTION("one is told") {
+    REQUIRE(writer.writes.forget("leg"));
+    CHECK_FALSE(writer.structure.forest.exists("foot"));
+    CHECK_FALSE(arm.node().exists("foot"));
+  }
+  SECTION("none is told") {
+    denies_all = true;
+    CHECK(outcome(writer.writes.forget("leg")) == "not_permitted");
+    CHECK(writer.structure.forest.exists("foot"));
+  }
+}
+
 TEST_CASE("writes: nobody waits for the structure of a partition without frames") {
   LoopbackNetwork network;
   const ScriptedOwner idle(network, "idle", {});
