@@ -399,22 +399,29 @@ TEST_CASE("keys: several processes may use one identity, and a daemon may restar
   CHECK(eventually([&] { return eye->lookup("base", "secret_forearm").has_value(); }));
 }
 
-// Fast DDS repeats a message of a handshake after a second. On a busy machine all meetings take
-// longer, and one of them may take much longer.
+// Fast DDS repeats a message of a handshake after a second. Where it drops such messages, 6 % of
+// all meetings take so long (docs/transport.md): more than three of a hundred in six of seven runs.
+// On a busy machine all meetings take longer, and some of them much longer.
 TEST_CASE("keys: a new participant does not wait until a handshake is repeated") {
   const SecuredRobot robot;
   std::vector<std::chrono::milliseconds> meetings;
-  for (int i = 0; i < 80; ++i) {
+  for (int i = 0; i < 100; ++i) {
     const auto begin = std::chrono::steady_clock::now();
     auto client = robot.client("eye");
     REQUIRE(client->lookup("base", "secret_forearm"));
     meetings.push_back(std::chrono::duration_cast<std::chrono::milliseconds>(
         std::chrono::steady_clock::now() - begin));
   }
-  std::sort(meetings.begin(), meetings.end());
-  const auto usual = meetings[meetings.size() / 2];
-  CAPTURE(usual.count(), meetings.back().count());
-  CHECK(meetings[meetings.size() - 2] < usual + 900ms);
+  std::vector<std::chrono::milliseconds> sorted = meetings;
+  std::sort(sorted.begin(), sorted.end());
+  const auto usual = sorted[sorted.size() / 2];
+  std::string slow;
+  for (std::size_t i = 0; i < meetings.size(); ++i) {
+    if (meetings[i] < usual + 900ms) continue;
+    slow += " " + std::to_string(i) + ": " + std::to_string(meetings[i].count()) + " ms";
+  }
+  CAPTURE(usual.count(), slow);
+  CHECK(sorted[sorted.size() - 4] < usual + 900ms);
 }
 
 }  // namespace tfdude
