@@ -139,7 +139,7 @@ def test_wait_next_says_at_once_that_its_path_has_ended_and_then_waits_for_its_r
     with pytest.raises(tfdude.LookupException):
         watch.wait_next(0.3)
     assert time.monotonic() - begin >= 0.3
-    node.add("tool", "arm", tfdude.Transform())
+    node.add("tool", "base", tfdude.Transform())
     watch.wait_next(20)
 
 
