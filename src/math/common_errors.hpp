@@ -12,6 +12,11 @@ namespace tfdude {
   return a.source == b.source && a.subtracts == b.subtracts;
 }
 
+/// Whether an observation has left nothing there but the name by which it is recognised.
+[[nodiscard]] inline bool is_name_only(const CommonError& common_error) {
+  return is_observed(common_error) && common_error.loading.isZero(0);
+}
+
 /// The entry for the same source in a list; null: none.
 template <class List>
 [[nodiscard]] auto of_same_source(List& common_errors, const CommonError& common_error)

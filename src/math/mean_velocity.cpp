@@ -71,6 +71,7 @@ class Sum {
   void finish(MeanVelocity& velocity) {
     std::vector<OfSource> parts;
     for (Shared& source : shared_) {
+      if (is_made(source.name) && source.before.isZero(0) && source.after.isZero(0)) continue;
       if (source.lasts) {
         Loading difference = -source.before;
         add_columns(difference, source.after);

@@ -26,8 +26,8 @@ StampedTransform collapsed(const Belief& X, Order order, std::optional<Time> sta
   const bool bounded = X.unknown || allow_any_relation(errors);
   StampedTransform found{collapse(X), stamp, {order, bounded, {}}};
   std::vector<std::string>& sources = found.basis.sources;
-  for (const auto& [source, subtracts, loading] : X.common_errors) {
-    sources.emplace_back(shown_source(source));
+  for (const CommonError& one : X.common_errors) {
+    if (!is_name_only(one)) sources.emplace_back(shown_source(one.source));
   }
   std::sort(sources.begin(), sources.end());
   sources.erase(std::unique(sources.begin(), sources.end()), sources.end());

@@ -1,10 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <string_view>
 
 #include "tfdude/base/id.hpp"
 #include "tfdude/math/interpolate.hpp"
 
 #include "base/saturating.hpp"
+#include "math/common_errors.hpp"
 #include "math/finite.hpp"
 #include "tree/forest_impl.hpp"
 #include "tree/row_ways.hpp"
@@ -54,6 +57,36 @@ bool shares_observation(const Correlation& one, const Correlation& other) {
       [&](const CommonError& error) { return is_observed(error) && has(error.source); });
 }
 
+// Of the value of an edge at an instant, or before it.
+const Correlation* correlation_before(const HeldVersion& edge, std::int64_t at) {
+  const Correlation* said = edge.correlation != nullptr ? &edge.correlation->said() : nullptr;
+  if (edge.samples == nullptr || edge.samples->count() == 0) return said;
+  const std::uint64_t place = edge.samples->place_of(at);
+  const bool there = place < edge.samples->next() && edge.samples->stamp(place) == at;
+  if (!there && place == edge.samples->oldest()) return said;
+  return correlation_at(*edge.samples->sample(there ? place : place - 1), said);
+}
+
+// Values of an edge that drifts have errors of the same names only if the same observations have
+// corrected them. One that has left no error of its own gets a name for an error of zero.
+Correlation with_name(const HeldVersion& edge, Correlation corrected, std::int64_t at,
+                      std::uint64_t commit) {
+  const Correlation* before = correlation_before(edge, at);
+  const auto is_left_by_it = [&](const CommonError& one) {
+    return is_observed(one) &&
+           (before == nullptr || of_same_source(before->common_errors, one) == nullptr);
+  };
+  auto& errors = corrected.common_errors;
+  const bool has_name = std::any_of(errors.begin(), errors.end(), is_left_by_it);
+  if (has_name || errors.size() >= kMaxCommonErrors) return corrected;
+  const auto of_edge = std::hash<std::string_view>()(edge.name->text);
+  // Commits are counted anew after a restart.
+  const std::string name = std::to_string(of_edge) + '.' + std::to_string(commit) + '.';
+  errors.push_back(
+      {std::string(kObservedPrefix) + '!' + name + std::to_string(at), false, Loading::Zero(6, 1)});
+  return corrected;
+}
+
 }  // namespace
 
 Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revision& revision,
@@ -94,6 +127,10 @@ Result<void> Forest::Impl::check_revision(const HeldVersion& edge, const Revisio
 void Forest::Impl::revise_sample(const HeldVersion& newest, const Revision& revision,
                                  std::int64_t stamp, const RowInfo& row, Telling telling) {
   SampleRevision fresh{revision.X_PC, revision.correlation, row};
+  if (drifts(newest)) {
+    fresh.correlation =
+        with_name(newest, std::move(fresh.correlation), stamp, frames_.commit_being_made());
+  }
   if (newest.samples != nullptr && newest.samples->count() > 0) {
     const SampleHistory& samples = *newest.samples;
     const std::uint64_t place = samples.place_of(stamp);

@@ -108,6 +108,7 @@ class TwoWays {
     for (const Way* way : {&a_, &b_}) {
       for (const EdgeFromFixed& edge : way->edges) {
         for (const CommonError& one : edge.X_PC.common_errors) {
+          if (is_name_only(one)) continue;
           const bool known = std::count(names.begin(), names.end(), one.source) > 0;
           if (!known && one.source.rfind(kOwn, 0) != 0) names.push_back(one.source);
         }

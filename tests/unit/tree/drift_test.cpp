@@ -1,11 +1,15 @@
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "math/mean_velocity.hpp"
 #include "support/catch.hpp"
 #include "support/consistency.hpp"
 #include "support/drifting.hpp"
 #include "support/random.hpp"
 #include "support/random_walk.hpp"
 #include "support/sampling.hpp"
+#include "tree/over_fixed.hpp"
 
 // An edge whose error is a random walk, beside a dense filter of odometry and a landmark.
 namespace tfdude {
@@ -41,6 +45,31 @@ struct Filter {
   }
   [[nodiscard]] double between() const { return std::sqrt(base + object - 2 * both); }
 };
+
+using Ends = std::pair<std::vector<EdgeFromFixed>, std::vector<EdgeFromFixed>>;
+
+// The edge of the base at two instants.
+Ends ends_of(const Forest& forest, int from, int to) {
+  const auto first = edges_from_fixed(forest, "world", "base", when(from));
+  const auto second = edges_from_fixed(forest, "world", "base", when(to));
+  REQUIRE(first);
+  REQUIRE(second);
+  return {*first, *second};
+}
+
+StampedTransform over(const Ends& ends, int from, int to) {
+  const StampedTransform X_FA{{ends.first[0].X_PC.pose, Covariance()}, at(from)};
+  const StampedTransform X_FB{{ends.second[0].X_PC.pose, Covariance()}, at(to)};
+  return over_fixed(X_FA, X_FB, ends.first, ends.second, Order::kSecond);
+}
+
+// Over one second.
+MeanVelocity velocity_of(const Ends& ends) {
+  const EdgeFromFixed& from = ends.first[0];
+  const EdgeFromFixed& to = ends.second[0];
+  const bool drifts = from.drifts && to.drifts && from.corrected == to.corrected;
+  return mean_velocity({{from.X_PC, to.X_PC, ObservedEdge::Way::kDown, false, drifts}}, 1);
+}
 
 }  // namespace
 
@@ -86,6 +115,50 @@ TEST_CASE("drift: a correction of the past is that of all later values") {
   const auto next = robot.forest.lookup("world", "base", when(11));
   REQUIRE(next);
   CHECK(next->pose.translation().x() - later->pose.translation().x() == Approx(0.2));
+}
+
+// What is left of the error before the correction is in both, and so is a part of what was added.
+TEST_CASE("drift: two instants with a correction between them have a bound") {
+  Drifting robot(of_deviations(0.02, 0));
+  constexpr double kSensor = 0.01 * 0.01;
+  constexpr double kAdded = 5 * kStep * 0.02 * 0.02;  // from one instant to the next
+  double variance = 0;
+  robot.drive(0);
+  for (int step = 5; step <= 40; step += 5) {
+    robot.drive(step);
+    variance += kAdded;
+    if (step % 10 != 0) continue;
+    // The edge alone, as if many samples had followed what was observed before.
+    const auto seen = robot.forest.lookup_segments({{"world", "base"}}, when(step), {}, true);
+    REQUIRE(seen);
+    const ObservedEdge edge{belief_of(seen->values[0], seen->correlations[0]),
+                            ObservedEdge::Way::kDown};
+    const Transform Z{Pose(), of_deviations(0.01, 1)};
+    const auto found = observe({edge}, Z, "observed:" + std::to_string(step), {1.0, true});
+    REQUIRE(found);
+    const Belief& X = found->edges[0].X_PC;
+    REQUIRE(robot.forest.revise({{"base", {X.pose, X.own}, {false, X.common_errors, {}}}}, at(step),
+                                seen->commit));
+    variance = variance * kSensor / (variance + kSensor);
+  }
+  robot.drive(45);
+  const double before = variance + kAdded;  // at 25 as at 35 and 45, but for the first steps
+  const double gain = (before + kAdded) / (before + kAdded + kSensor);
+  const double right = gain * gain * (before + kSensor) + (1 - gain) * (1 - gain) * kAdded + kAdded;
+  const auto ends = ends_of(robot.forest, 35, 45);
+  const StampedTransform X = over(ends, 35, 45);
+  CHECK(X.basis.bound);
+  CHECK(X.basis.sources.empty());
+  CHECK(X.covariance.of_specified().upper()[0] > 0.999 * right);
+  const MeanVelocity velocity = velocity_of(ends);
+  CHECK(velocity.bound);
+  CHECK(velocity.sources.empty());
+  CHECK(velocity.covariance.upper()[0] > 0.999 * right);
+  // Within one interval there is none.
+  const auto between = ends_of(robot.forest, 40, 45);
+  CHECK_FALSE(over(between, 40, 45).basis.bound);
+  CHECK(over(between, 40, 45).covariance.of_specified().upper()[0] == Approx(kAdded));
+  CHECK(velocity_of(between).covariance.upper()[0] == Approx(kAdded));
 }
 
 // A camera's stamps are rarely those of the odometry.
