@@ -16,6 +16,15 @@ constexpr std::size_t kMoves = 2;
 constexpr std::size_t kDrifts = 3;
 constexpr std::size_t kDriftsCorrected = 4;
 
+// Whether an observation has corrected a sample, or one from which it follows. Others have a
+// revision, too, if they follow without noise, or a watcher was told of them.
+bool is_corrected(const Sample& sample) {
+  const SharedRevision* revision = sample.revision();
+  if (revision == nullptr) return false;
+  const RowInfo& row = revision->row;
+  return row.observed || row.follows != RowInfo{}.follows || row.told != Told::kNot;
+}
+
 // @return nothing if it cannot be read
 template <class Edge>
 std::optional<std::size_t> count_of_marks(const Edge& edge, std::optional<Time> at) {
@@ -32,10 +41,10 @@ std::optional<std::size_t> count_of_marks(const Edge& edge, std::optional<Time> 
   if (found.before->stamp == t) found.after = nullptr;
   typename decltype(samples)::Copies copies;
   if (!samples.make_whole(found, copies)) return std::nullopt;
-  const bool is_corrected = found.before->revision() != nullptr;
+  const bool corrected = is_corrected(*found.before);
   // Between what was corrected and what was not, the value follows from neither.
-  if (found.after != nullptr && is_corrected != (found.after->revision() != nullptr)) return kMoves;
-  return is_corrected ? kDriftsCorrected : kDrifts;
+  if (found.after != nullptr && corrected != is_corrected(*found.after)) return kMoves;
+  return corrected ? kDriftsCorrected : kDrifts;
 }
 
 std::vector<std::string> marks(std::size_t count, const Name& name) {

@@ -322,6 +322,7 @@ bool RemoteSamples::copy(const Sample& sample, Copies::One& copy) const {
     if (revision == nullptr) return false;
     read.given = revision->given;
     read.row.observed = is_set(revision->row.observed);
+    read.row.follows = revision->row.follows;
     if (!edge_.read(RemoteForest::load(revision->flat()), read.correlation)) return false;
     own.is_revised = true;
     own.is_given = false;

@@ -125,7 +125,7 @@ class SharedRevision {
         arena_(&arena) {}
 
   const Transform given;
-  const RowInfo row;  ///< for the owner only, except for `observed`
+  const RowInfo row;  ///< for the owner only, except for `observed` and `follows`
   [[nodiscard]] const Correlation& correlation() const { return *shared_; }
   [[nodiscard]] const FlatCorrelation* const& flat() const { return shared_.flat(); }
   [[nodiscard]] std::size_t bytes() const { return sizeof(*this) + shared_.bytes(); }

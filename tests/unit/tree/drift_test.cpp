@@ -161,6 +161,20 @@ TEST_CASE("drift: two instants with a correction between them have a bound") {
   CHECK(velocity_of(between).covariance.upper()[0] == Approx(kAdded));
 }
 
+TEST_CASE("drift: an edge that moves as it was told has one error at two instants") {
+  Drifting robot{Covariance()};
+  REQUIRE(robot.forest.update("base", {robot.G, of_deviations(0.1, 0)}, at(0)));
+  for (const int step : {1, 2}) robot.drive(step);
+  for (const int begin : {0, 1}) {
+    INFO("from step " << begin);
+    const auto ends = ends_of(robot.forest, begin, 2);
+    const StampedTransform X = over(ends, begin, 2);
+    CHECK_FALSE(X.basis.bound);
+    CHECK(X.covariance.of_specified().matrix().cwiseAbs().maxCoeff() < 1e-15);
+    CHECK(velocity_of(ends).covariance.matrix().cwiseAbs().maxCoeff() < 1e-15);
+  }
+}
+
 // A camera's stamps are rarely those of the odometry.
 TEST_CASE("drift: what is seen between two samples corrects all later ones") {
   Drifting robot;
