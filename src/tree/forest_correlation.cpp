@@ -10,6 +10,25 @@
 
 // How the errors of edges are correlated.
 namespace tfdude {
+namespace {
+
+// What observations have found stays: the edge's error is no more certain because less is said of
+// its sources.
+// @param now  of a value, instead of what was said before
+Correlation said_instead(const Correlation& now, const Correlation& before,
+                         const Correlation& said) {
+  Correlation instead = said;
+  instead.observed_with = now.observed_with;
+  const auto is_said = [](const Correlation& by, const CommonError& one) {
+    return of_same_source(by.common_errors, one) != nullptr;
+  };
+  std::copy_if(
+      now.common_errors.begin(), now.common_errors.end(), std::back_inserter(instead.common_errors),
+      [&](const CommonError& one) { return !is_said(before, one) && !is_said(said, one); });
+  return instead;
+}
+
+}  // namespace
 
 Belief belief_of(const Transform& X, const PathCorrelation& correlation) {
   return {X.pose, X.covariance.of_specified(), correlation.unknown, correlation.common_errors,
@@ -82,25 +101,51 @@ Result<void> Forest::Impl::check_room(const HeldVersion& edge, const Correlation
                                        std::to_string(kMaxCommonErrors) + " together");
 }
 
-// What observations have found stays: the edge's error is no more certain because less is said of
-// its sources.
 void Forest::Impl::say_correlation(std::uint32_t slot, const Correlation& said) {
   HeldVersion& fresh = push_held(slot, frames_.newest_value(slot).X_PC);
-  if (fresh.correlation == nullptr || !fresh.correlation->revised()) {
-    if (said.empty()) return set_correlation(fresh, nullptr);
-    return correlate(fresh, said);
+  const Correlation before =
+      fresh.correlation != nullptr ? fresh.correlation->said() : Correlation();
+  if (fresh.correlation != nullptr && fresh.correlation->revised()) {
+    correlate(fresh, said, said_instead(fresh.correlation->now(), before, said));
+  } else if (said.empty()) {
+    set_correlation(fresh, nullptr);
+  } else {
+    correlate(fresh, said);
   }
-  const Correlation& before = fresh.correlation->now();
-  Correlation now = said;
-  now.observed_with = before.observed_with;
-  const auto is_said = [](const Correlation& by, const CommonError& one) {
-    return of_same_source(by.common_errors, one) != nullptr;
-  };
-  std::copy_if(before.common_errors.begin(), before.common_errors.end(),
-               std::back_inserter(now.common_errors), [&](const CommonError& one) {
-                 return !is_said(fresh.correlation->said(), one) && !is_said(said, one);
-               });
-  correlate(fresh, said, std::move(now));
+  if (fresh.moving() && !fresh.lacks_sample()) say_of_samples(slot, before, said);
+}
+
+// Later samples of an edge that drifts follow from these. All of them are told; of another edge,
+// those that take part in all observations, which are recognised by their commit.
+void Forest::Impl::say_of_samples(std::uint32_t slot, const Correlation& before,
+                                  const Correlation& said) {
+  bool any = false;
+  std::uint64_t number = frames_.newest_value(slot).samples->oldest();
+  while (number < frames_.newest_value(slot).samples->next()) {
+    const HeldVersion& edge = frames_.newest_value(slot);
+    const SampleHistory& samples = *edge.samples;
+    const bool drifting = drifts(edge);
+    const bool is_row = !drifting && samples.sample(number)->commit == samples.observed();
+    const std::uint64_t first = number;
+    std::vector<std::pair<Transform, SampleRevision>> values;
+    for (; number < samples.next() && (drifting || values.empty()); ++number) {
+      const Sample& sample = *samples.sample(number);
+      const SharedRevision* revision = sample.revision();
+      if (revision == nullptr) break;
+      values.push_back(
+          {sample.value(),
+           {revision->given, said_instead(revision->correlation(), before, said), revision->row}});
+    }
+    if (values.empty()) {
+      ++number;
+      continue;
+    }
+    any = true;
+    const bool tells = drifting || is_row;
+    replace_revisions(edge, first, values, tells ? Telling::kNow : Telling::kLater);
+    if (is_row) frames_.newest_value(slot).samples->set_observed(frames_.commit_being_made());
+  }
+  if (any) show_revision(slot);
 }
 
 Result<void> Forest::correlate(std::string_view id, const Correlation& correlation) {

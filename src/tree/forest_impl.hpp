@@ -273,6 +273,10 @@ class Forest::Impl {
                      const RowInfo& row, Telling telling) TFDUDE_REQUIRES(mutex_);
   /// Corrects the samples after a row, up to the next one. @param row  number of its sample
   void carry_on(std::uint32_t slot, std::uint64_t row, Telling telling) TFDUDE_REQUIRES(mutex_);
+  /// Gives consecutive samples, at least one, other revisions, with their values.
+  void replace_revisions(const HeldVersion& edge, std::uint64_t first,
+                         const std::vector<std::pair<Transform, SampleRevision>>& values,
+                         Telling telling) TFDUDE_REQUIRES(mutex_);
   /// Gives consecutive samples, at least one, other values.
   /// @param follows  stamp of the row that they follow
   void replace_followers(const HeldVersion& edge, std::uint64_t first, std::int64_t follows,
@@ -290,6 +294,9 @@ class Forest::Impl {
   [[nodiscard]] static Result<void> check_room(const HeldVersion& edge, const Correlation& said);
   /// Pushes the newest value again, with another correlation, for which there is room.
   void say_correlation(std::uint32_t slot, const Correlation& said) TFDUDE_REQUIRES(mutex_);
+  /// Of the samples that have a correlation of their own. @param before  what was said
+  void say_of_samples(std::uint32_t slot, const Correlation& before, const Correlation& said)
+      TFDUDE_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_revision(const HeldVersion& edge, const Revision& revision,
                                             std::optional<Time> stamp, std::uint64_t seen)
       TFDUDE_REQUIRES(mutex_);

@@ -190,21 +190,31 @@ void Forest::Impl::carry_on(std::uint32_t slot, std::uint64_t row, Telling telli
 void Forest::Impl::replace_followers(const HeldVersion& edge, std::uint64_t first,
                                      std::int64_t follows,
                                      const std::vector<CorrelatedValue>& values, Telling telling) {
+  std::vector<std::pair<Transform, SampleRevision>> moved;
+  for (const CorrelatedValue& value : values) {
+    const Sample& before = *edge.samples->sample(first + moved.size());
+    const RowInfo row{false, is_between(before), 0, {}, follows};
+    moved.push_back({value.X_PC, {{given(before).pose, {}}, value.correlation, row}});
+  }
+  replace_revisions(edge, first, moved, telling);
+}
+
+void Forest::Impl::replace_revisions(
+    const HeldVersion& edge, std::uint64_t first,
+    const std::vector<std::pair<Transform, SampleRevision>>& values, Telling telling) {
   SampleHistory* superseded = edge.samples;
   const std::uint64_t end = first + values.size();
   const bool to_newest = end == superseded->next();
-  HeldVersion& fresh = push_held(edge.slot, to_newest ? values.back().X_PC : edge.X_PC);
+  HeldVersion& fresh = push_held(edge.slot, to_newest ? values.back().first : edge.X_PC);
   if (to_newest) end_revision(fresh, Ties::kStay);
   bury(edge.slot, *superseded, {first, end});
   std::vector<Sample> samples;
   bool begins = superseded->has_instants(end);
   for (std::uint64_t number = first; number < end; ++number) {
     const Sample& before = *superseded->sample(number);
-    const CorrelatedValue& value = values[number - first];
-    const SampleRevision moved{
-        {given(before).pose, {}}, value.correlation, {false, is_between(before), 0, {}, follows}};
+    const auto& [X_PC, revision] = values[number - first];
     begins = begins || superseded->has_instants(number);
-    samples.push_back(sample_at(*superseded, number, {value.X_PC, nullptr, &moved}, before.stamp));
+    samples.push_back(sample_at(*superseded, number, {X_PC, nullptr, &revision}, before.stamp));
     if (telling == Telling::kLater) samples.back().commit = before.commit;
     reclaimer_.samples().release(before.shared);
   }

@@ -340,6 +340,38 @@ TEST_CASE("A revision of a dynamic edge is a sample, or replaces the one with it
   REQUIRE(robot.forest.update("a", X, at(200ms)));
 }
 
+TEST_CASE("What is said of an edge later is said of the samples that were observed, too") {
+  Random random(662);
+  INFO("seed " << random.seed());
+  Robot robot(random);
+  const Transform X = random.transform();
+  for (const auto stamp : {10ms, 20ms, 30ms}) REQUIRE(robot.forest.update("a", X, at(stamp)));
+  const CommonError left = common_error(random, std::string(kObservedPrefix) + "arm.1");
+  for (const auto stamp : {20ms, 30ms}) {
+    REQUIRE(robot.forest.revise({{"a", X, shared(left)}}, at(stamp), UINT64_MAX));
+  }
+  for (const char* source : {"supply", "load"}) {
+    const CommonError said = common_error(random, source);
+    REQUIRE(robot.forest.correlate("a", shared(said)));
+    for (const auto stamp : {10ms, 20ms, 30ms}) {
+      INFO(source << " at " << stamp.count() << " ms");
+      std::vector<CommonError> expected{said};
+      if (stamp > 10ms) expected.push_back(left);
+      Query query;
+      query.at = at(stamp);
+      const auto found = robot.forest.lookup("world", "a", query);
+      REQUIRE(found);
+      CHECK(covariance_diff(found->covariance, collapse(with(X, expected)).covariance, 1e-12) ==
+            "");
+    }
+  }
+  // Partners of the last observation are still tied to its sample alone.
+  const auto rows = robot.forest.lookup_segments({{"world", "a"}}, Query{}, {}, true, Rows::kAll);
+  REQUIRE(rows);
+  REQUIRE(rows->rows.size() == 1);
+  CHECK(rows->rows[0].stamp == at(30ms));
+}
+
 TEST_CASE("An invalid correlation or revision is rejected and changes nothing") {
   Random random(658);
   Robot robot(random);

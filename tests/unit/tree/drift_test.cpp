@@ -175,6 +175,50 @@ TEST_CASE("drift: an edge that moves as it was told has one error at two instant
   }
 }
 
+// The source is one error for all time, moved along with the edge.
+TEST_CASE("drift: a source that is said later is an error of all samples that follow") {
+  const auto supply = [](double size) {
+    Loading F = Loading::Zero(6, 1);
+    F(0, 0) = size;
+    return Correlation{false, {{"supply", false, F}}, {}};
+  };
+  const bool observed = GENERATE(false, true);
+  INFO((observed ? "observed" : "not observed"));
+  Drifting robot{Covariance()};
+  REQUIRE(robot.forest.update("base", {Pose(), of_deviations(observed ? 1 : 0, 0)}, at(0)));
+  for (const int step : {1, 2}) robot.drive(step);
+  double left = 0;
+  if (observed) {
+    left = 1e-3 / std::sqrt(1 + 1e-6);
+    const auto seen = robot.forest.lookup_segments({{"world", "base"}}, when(1), {}, true).value();
+    const Covariance own = of_deviations(left, 0);
+    REQUIRE(robot.forest.revise({{"base", {Pose(), own}, {}}}, at(1), seen.commit));
+  }
+  REQUIRE(robot.forest.correlate("base", supply(0.1)));
+  robot.drive(3);
+  for (const int step : {1, 2, 3}) {
+    INFO("step " << step);
+    CHECK(robot.sigma("world", "base", step) == Approx(std::hypot(0.1, left)));
+  }
+  // Another size, then none.
+  REQUIRE(robot.forest.correlate("base", supply(0.2)));
+  robot.drive(4);
+  CHECK(robot.sigma("world", "base", 4) == Approx(std::hypot(0.2, left)));
+  REQUIRE(robot.forest.correlate("base", {}));
+  robot.drive(5);
+  for (const int step : {1, 3, 5}) {
+    INFO("step " << step);
+    CHECK(robot.sigma("world", "base", step) == Approx(left).margin(1e-12));
+  }
+  // What is seen late corrects the later samples, which have the source, too.
+  REQUIRE(robot.forest.correlate("base", supply(0.1)));
+  const auto late = robot.forest.lookup_segments({{"world", "base"}}, when(3), {}, true).value();
+  const Correlation there{false, late.correlations[0].common_errors, {}};
+  REQUIRE(robot.forest.revise({{"base", late.values[0], there}}, at(3), late.commit));
+  robot.drive(6);
+  CHECK(robot.sigma("world", "base", 6) == Approx(std::hypot(0.1, left)));
+}
+
 // A camera's stamps are rarely those of the odometry.
 TEST_CASE("drift: what is seen between two samples corrects all later ones") {
   Drifting robot;
