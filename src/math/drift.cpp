@@ -6,6 +6,7 @@
 
 #include "tfdude/math/perturbation.hpp"
 
+#include "math/instant_sources.hpp"
 #include "math/symmetric_eigen.hpp"
 
 namespace tfdude {
@@ -74,6 +75,22 @@ bool are_corrected_together(const Belief& a, const Belief& b) {
     return std::any_of(X.common_errors.begin(), X.common_errors.end(), is_observed);
   };
   return was_observed(a) && was_observed(b) && has_all(a, b) && has_all(b, a);
+}
+
+bool ties(const CommonError& common_error) {
+  return is_observed(common_error) && said_source(common_error.source).empty() &&
+         !common_error.loading.isZero(0);
+}
+
+Covariance take_whole(Belief& X) {
+  Matrix6d sigma = X.own.matrix();
+  for (const CommonError& one : X.common_errors) {
+    if (is_observed(one) && !one.subtracts) sigma += one.loading * one.loading.transpose();
+  }
+  X.own = {};
+  X.common_errors.erase(std::remove_if(X.common_errors.begin(), X.common_errors.end(), is_observed),
+                        X.common_errors.end());
+  return Covariance::trusted(sigma);
 }
 
 }  // namespace tfdude

@@ -25,4 +25,11 @@ struct Drift {
 /// may be correlated in any way.
 [[nodiscard]] bool are_corrected_together(const Belief& a, const Belief& b);
 
+/// Whether it is a part of an edge's error that an observation may have tied to those of others.
+[[nodiscard]] bool ties(const CommonError& common_error);
+
+/// Removes all errors of an edge, but for those of named sources. @return  their covariance, as
+/// large as before any observation
+[[nodiscard]] Covariance take_whole(Belief& X);
+
 }  // namespace tfdude

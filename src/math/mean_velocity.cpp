@@ -54,10 +54,11 @@ std::optional<Drift> drift_of(const EdgeAtEnds& edge) {
 
 class Sum {
  public:
-  void add(const EdgeAtEnds& edge, const Gains& gains) {
+  void add(EdgeAtEnds edge, const Gains& gains) {
     const std::optional<Drift> drift = drift_of(edge);
     const bool lasts =
         drift.has_value() || (edge.drifts && are_corrected_together(edge.before, edge.after));
+    if (!lasts) allow_any_tie(edge, gains);
     total_ += of_ends(drift, gains, edge.before.own, edge.after.own);
     add_unknown(edge, gains);
     for (const CommonError& one : edge.before.common_errors) {
@@ -101,11 +102,27 @@ class Sum {
     return bound(mapped(gains.before, before), mapped(gains.after, after));
   }
 
+  // The errors at both ends may be correlated in any way. What an observation has left of one adds
+  // to those of other edges, so the other one may be correlated with these, too.
+  void allow_any_tie(EdgeAtEnds& edge, const Gains& gains) {
+    const auto adds = [](const Belief& X) {
+      return std::any_of(X.common_errors.begin(), X.common_errors.end(),
+                         [](const CommonError& one) { return !one.subtracts && ties(one); });
+    };
+    const bool keeps_before = adds(edge.before);
+    if (!keeps_before && !adds(edge.after)) return;
+    const Matrix6d& gain = keeps_before ? gains.after : gains.before;
+    add_unknown(mapped(gain, take_whole(keeps_before ? edge.after : edge.before)));
+  }
+
   void add_unknown(const EdgeAtEnds& edge, const Gains& gains) {
     if (!edge.before.unknown && !edge.after.unknown) return;
     const Covariance share = of_ends(edge.fixed ? drift_of(edge) : std::nullopt, gains,
                                      edge.before.unknown.value_or(Covariance()),
                                      edge.after.unknown.value_or(Covariance()));
+    add_unknown(share);
+  }
+  void add_unknown(const Covariance& share) {
     unknown_ = unknown_ ? bound(*unknown_, share) : share;
     bound_ = true;
   }

@@ -223,12 +223,13 @@ class TwoWays {
   void allow_any(std::size_t in_a, std::size_t in_b) {
     const Belief& of_a = a_.edges[in_a].X_PC;
     const Belief& of_b = b_.edges[in_b].X_PC;
-    const bool any = !is_zero(of_a.own) || !is_zero(of_b.own);
-    if (!any || !(is_tied(of_a) || is_tied(of_b))) return allow_any_own(in_a, in_b);
+    if (!is_tied(of_a) && !is_tied(of_b)) return allow_any_own(in_a, in_b);
     bound_ = true;
     // What the observation subtracts is of the own part, so one of both values stays whole.
     const bool keeps_a = is_tied(of_a);
-    take_whole(keeps_a ? b_ : a_, keeps_a ? in_b : in_a);
+    Way& other = keeps_a ? b_ : a_;
+    const std::size_t i = keeps_a ? in_b : in_a;
+    add_unknown(mapped(other.gains[i], take_whole(other.edges[i].X_PC)));
   }
   void allow_any_own(std::size_t in_a, std::size_t in_b) {
     Belief& of_a = a_.edges[in_a].X_PC;
@@ -241,23 +242,9 @@ class TwoWays {
     scale(of_a.own, weights.of_A);
     scale(of_b.own, weights.of_B);
   }
+  // Beyond some columns, all of what observations have left adds, and no own part remains.
   static bool is_tied(const Belief& X) {
-    return std::any_of(X.common_errors.begin(), X.common_errors.end(),
-                       [](const CommonError& one) { return one.subtracts; });
-  }
-
-  // All that the edge has, but for named sources: as large as before any observation.
-  void take_whole(Way& way, std::size_t i) {
-    Belief& X = way.edges[i].X_PC;
-    Matrix6d sigma = X.own.matrix();
-    for (const CommonError& one : X.common_errors) {
-      if (is_observed(one) && !one.subtracts) sigma += one.loading * one.loading.transpose();
-    }
-    add_unknown(mapped(way.gains[i], Covariance::trusted(sigma)));
-    X.own = {};
-    X.common_errors.erase(
-        std::remove_if(X.common_errors.begin(), X.common_errors.end(), is_observed),
-        X.common_errors.end());
+    return std::any_of(X.common_errors.begin(), X.common_errors.end(), ties);
   }
 
   void take_unknown(Way& way, std::size_t i) {

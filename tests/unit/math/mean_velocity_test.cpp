@@ -211,6 +211,29 @@ TEST_CASE("mean velocity: the bound is reached when the ends are opposed") {
   CHECK(testing::moment_diff(S, sigma, kSamples, 0.01) == "");
 }
 
+// e0 = s and m = -s; the velocity is that of e1 + m - e0 - m, and e1 may be -s.
+TEST_CASE("mean velocity: what an observation has left of one end may be that of the other") {
+  const auto along = [](double size) {
+    Loading F = Loading::Zero(6, 1);
+    F(0, 0) = size;
+    return std::vector<CommonError>{{"observed:1", false, F}};
+  };
+  for (const bool first : {true, false}) {
+    Belief seen;
+    seen.common_errors = along(1);
+    Belief alone;
+    alone.own = *Covariance::from_stddev({1, 0, 0, 0, 0, 0});
+    Belief mount;
+    mount.common_errors = along(-1);
+    const MeanVelocity velocity =
+        mean_velocity({{first ? seen : alone, first ? alone : seen, Way::kDown, false, false},
+                       {mount, mount, Way::kDown, true, false}},
+                      1);
+    CHECK(velocity.bound);
+    CHECK(velocity.covariance.upper()[0] > 4 - 1e-9);
+  }
+}
+
 TEST_CASE("mean velocity: the error of an edge that drifts goes on, and grows") {
   Random random(706);
   INFO("seed " << random.seed());

@@ -398,4 +398,31 @@ TEST_CASE(
   }
 }
 
+// e0 = s and m = -s; X_AB is off by e1 + m - e0 - m, and e1 may be -s.
+TEST_CASE("over fixed: what an observation has left may all add") {
+  const auto along = [](double size) {
+    Loading F = Loading::Zero(6, 1);
+    F(0, 0) = size;
+    return std::vector<CommonError>{{"observed:1", false, F}};
+  };
+  EdgeFromFixed seen{"moves", {}, false, true, false, false};
+  seen.X_PC.common_errors = along(1);
+  EdgeFromFixed later = seen;
+  later.X_PC.common_errors.clear();
+  later.X_PC.own = *Covariance::from_stddev({1, 0, 0, 0, 0, 0});
+  EdgeFromFixed mount{"mount", {}, false, false, false, false};
+  mount.X_PC.common_errors = along(-1);
+  // Another observation, of the other instant.
+  EdgeFromFixed again = seen;
+  again.X_PC.common_errors[0].source = "observed:2";
+  for (const EdgeFromFixed& other : {later, again}) {
+    for (const bool first : {true, false}) {
+      const StampedTransform X_AB =
+          answer({{first ? seen : other, mount}, {first ? other : seen, mount}});
+      CHECK(X_AB.basis.bound);
+      CHECK(X_AB.covariance.of_specified().upper()[0] > 4 - 1e-9);
+    }
+  }
+}
+
 }  // namespace tfdude
