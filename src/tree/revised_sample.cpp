@@ -245,7 +245,9 @@ CorrelatedValue extrapolate_correlated(const Sample& before, const Sample& after
     complete = complete && G0.covariance.complete() && G1.covariance.complete();
   }
   X.covariance.set_complete(complete);
-  return split(X, times(to_there, X1.common_errors), X1.unknown.has_value());
+  // What the twist has of the sources is of both samples as given, and so it is on other edges.
+  const bool of_sources = walk == nullptr && said != nullptr && !said->common_errors.empty();
+  return split(X, times(to_there, X1.common_errors), X1.unknown.has_value() || of_sources);
 }
 
 }  // namespace tfdude

@@ -272,6 +272,32 @@ double sigma_of(const StampedTransform& X) {
   return std::sqrt(X.covariance.if_complete()->upper()[0]);
 }
 
+// One interval beyond, the errors S0, S1 of the source count 2 S1 - S0 of a sample as given, and
+// S1 - S0 of one whose own error an observation has removed.
+TEST_CASE("A source adds up beyond a sample that was corrected") {
+  Chain chain;
+  for (const char* id : {"a", "b"}) chain.add(id, *id == 'a' ? "world" : "a", 1, {0, 1});
+  const auto seen = chain.forest.lookup_segments({{"world", "a"}}, {}, {}, true);
+  REQUIRE(seen);
+  const ObservedEdge edge{belief_of(seen->values[0], seen->correlations[0]),
+                          ObservedEdge::Way::kDown};
+  const Covariance sensor = *Covariance::from_stddev({1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6});
+  const auto found = observe({edge}, {Pose(), sensor}, "observed:1", {1.0, true});
+  REQUIRE(found);
+  const Belief& X = found->edges[0].X_PC;
+  REQUIRE(chain.forest.revise({{"a", {X.pose, X.own}, {false, X.common_errors, {}}}}, at(1),
+                              seen->commit));
+  Query query;
+  query.at = at(2);
+  query.extrapolate = std::chrono::seconds(1);
+  const auto ahead = chain.forest.lookup("world", "b", query);
+  REQUIRE(ahead);
+  CHECK(ahead->basis.bound);
+  // 3 S1 - 2 S0 at the worst.
+  CHECK(sigma_of(*ahead) > 0.999 * 5 * kSize);
+  CHECK(sigma_of(*ahead) < 1.01 * 5 * kSize);
+}
+
 TEST_CASE("A source of different samples does not cancel at an end of two instants") {
   Chain chain;
   chain.add("a", "world", 1, {0, 2, 4, 6});
