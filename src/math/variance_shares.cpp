@@ -1,9 +1,13 @@
 #include "math/variance_shares.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+
+#include "math/common_errors.hpp"
+#include "math/drift.hpp"
 
 namespace tfdude {
 namespace {
@@ -40,19 +44,53 @@ void add(const RowVector6d& gradient, const CommonError& error, Eigen::RowVector
   sum.head(term.size()) += term;
 }
 
-// The covariance of the number with an edge's error, and of that error.
-double after_measuring(const Belief& X_PC, const RowVector6d& gradient, const Sums& sums,
-                       double total, const Eigen::Matrix<double, 6, 1>& sensor) {
-  Matrix6d V = X_PC.own.matrix();
-  RowVector6d c = gradient * V;
-  for (const CommonError& error : X_PC.common_errors) {
-    const double sign = error.subtracts ? -1 : 1;
-    const Eigen::RowVectorXd& sum = sums.at({error.source, error.subtracts});
-    c += sign * sum.head(error.loading.cols()) * error.loading.transpose();
-    V += sign * error.loading * error.loading.transpose();
+// The covariance of the errors of two edges.
+Matrix6d between(const std::vector<ObservedEdge>& edges, std::size_t j, std::size_t k) {
+  Matrix6d P = j == k ? edges[k].X_PC.own.matrix() : Matrix6d::Zero();
+  for (const CommonError& one : edges[j].X_PC.common_errors) {
+    const CommonError* other = of_same_source(edges[k].X_PC.common_errors, one);
+    if (other == nullptr) continue;
+    const Eigen::Index columns = std::min(one.loading.cols(), other->loading.cols());
+    P += (one.subtracts ? -1 : 1) * one.loading.leftCols(columns) *
+         other->loading.leftCols(columns).transpose();
   }
-  V.diagonal() += sensor;
-  return total - c.dot(V.ldlt().solve(c.transpose()));
+  return P;
+}
+
+// The edges that an observation of this one corrects: itself, and those that observations have tied
+// to it, or to one of these.
+std::vector<std::size_t> corrected_with(const std::vector<ObservedEdge>& edges, std::size_t edge) {
+  const auto are_tied = [&](std::size_t j, std::size_t k) {
+    const auto& errors = edges[k].X_PC.common_errors;
+    return std::any_of(errors.begin(), errors.end(), [&](const CommonError& one) {
+      const CommonError* other = of_same_source(edges[j].X_PC.common_errors, one);
+      return ties(one) && other != nullptr && ties(*other);
+    });
+  };
+  std::vector<std::size_t> all{edge};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t j = 0; j < edges.size(); ++j) {
+      const bool known = std::find(all.begin(), all.end(), j) != all.end();
+      if (!known && are_tied(j, all[i])) all.push_back(j);
+    }
+  }
+  return all;
+}
+
+// The variance of the number, after those edges are corrected.
+double after_measuring(const std::vector<ObservedEdge>& edges, std::size_t edge,
+                       const std::vector<RowVector6d>& gradients, double total,
+                       const Eigen::Matrix<double, 6, 1>& sensor) {
+  RowVector6d c = RowVector6d::Zero();  // of the number with the edge's error
+  for (std::size_t j = 0; j < edges.size(); ++j) c += gradients[j] * between(edges, j, edge);
+  RowVector6d d = RowVector6d::Zero();  // what is used of it
+  for (const std::size_t j : corrected_with(edges, edge)) {
+    d += gradients[j] * between(edges, j, edge);
+  }
+  Matrix6d S = between(edges, edge, edge);
+  S.diagonal() += sensor;
+  const RowVector6d gain = S.ldlt().solve(d.transpose()).transpose();
+  return total - 2 * gain.dot(c) + gain.dot(d);
 }
 
 }  // namespace
@@ -100,8 +138,7 @@ VarianceShares variance_shares(const std::vector<ObservedEdge>& edges,
     shares.total += variance;
   }
   for (std::size_t k = 0; k < edges.size(); ++k) {
-    shares.after.push_back(
-        after_measuring(edges[k].X_PC, gradients[k], sums, shares.total, sensor));
+    shares.after.push_back(after_measuring(edges, k, gradients, shares.total, sensor));
   }
   return shares;
 }

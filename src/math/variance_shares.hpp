@@ -27,7 +27,8 @@ struct VarianceShares {
   double total = 0;                       ///< the sum of all below
   std::vector<double> edges;              ///< of own parts, by edge
   std::map<std::string, double> sources;  ///< of common errors, less what observations have removed
-  /// The variance after a measurement of each edge, by an independent error.
+  /// The variance after an observation of each edge, by an independent error: it corrects the edge
+  /// and those that observations have tied to it, but estimates no source.
   std::vector<double> after;
 };
 

@@ -37,11 +37,11 @@ Eigen::MatrixXd jacobian(const std::vector<ObservedEdge>& edges) {
   return J;
 }
 
-// The joint covariance of all errors: own parts, and the loadings of two sources.
+// The joint covariance of all errors: own parts, and the loadings of the sources.
 Eigen::MatrixXd joint(const std::vector<ObservedEdge>& edges) {
   const auto size = 6 * static_cast<Eigen::Index>(edges.size());
   Eigen::MatrixXd P = Eigen::MatrixXd::Zero(size, size);
-  for (const std::string source : {"s", "t"}) {
+  for (const std::string source : {"s", "t", "observed:1", "observed:2"}) {
     for (const bool subtracts : {false, true}) {
       Eigen::MatrixXd F = Eigen::MatrixXd::Zero(size, 3);
       for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -60,9 +60,33 @@ Eigen::MatrixXd joint(const std::vector<ObservedEdge>& edges) {
   return P;
 }
 
+bool are_tied(const ObservedEdge& one, const ObservedEdge& other) {
+  for (const CommonError& a : one.X_PC.common_errors) {
+    for (const CommonError& b : other.X_PC.common_errors) {
+      const bool observed = a.source == "observed:1" || a.source == "observed:2";
+      if (observed && a.source == b.source && a.subtracts == b.subtracts) return true;
+    }
+  }
+  return false;
+}
+
+// As observe() corrects: the edge, and those that are tied to it, also over others.
+std::vector<bool> corrected_with(const std::vector<ObservedEdge>& edges, std::size_t edge) {
+  std::vector<bool> all(edges.size());
+  all[edge] = true;
+  for (std::size_t round = 0; round < edges.size(); ++round) {
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      for (std::size_t j = 0; j < edges.size(); ++j) {
+        if (all[i] && are_tied(edges[i], edges[j])) all[j] = true;
+      }
+    }
+  }
+  return all;
+}
+
 }  // namespace
 
-TEST_CASE("variance shares: they add up to the variance, and measurements are those of a filter") {
+TEST_CASE("variance shares: they add up to the variance, and observations are those of a filter") {
   Random random(4612);
   INFO("seed " << random.seed());
   for (int run = 0; run < 20; ++run) {
@@ -71,7 +95,7 @@ TEST_CASE("variance shares: they add up to the variance, and measurements are th
       edge.X_PC.pose = random.pose();
       edge.X_PC.own = random.covariance(0.1, 0.1);
       edge.way = random.index(2) == 0 ? ObservedEdge::Way::kUp : ObservedEdge::Way::kDown;
-      for (const std::string source : {"s", "t"}) {
+      for (const std::string source : {"s", "t", "observed:1", "observed:2"}) {
         if (random.index(2) == 0) continue;
         Loading loading = Loading::Random(6, 1 + static_cast<Eigen::Index>(random.index(3))) * 0.1;
         edge.X_PC.common_errors.push_back({source, false, loading});
@@ -112,7 +136,14 @@ TEST_CASE("variance shares: they add up to the variance, and measurements are th
       H.middleCols<6>(at).setIdentity();
       Matrix6d S = H * P * H.transpose();
       S.diagonal() += sensor;
-      const Eigen::MatrixXd after = P - P * H.transpose() * S.inverse() * H * P;
+      Eigen::MatrixXd K = P * H.transpose() * S.inverse();
+      const std::vector<bool> corrected = corrected_with(edges, k);
+      for (std::size_t i = 0; i < edges.size(); ++i) {
+        if (!corrected[i]) K.middleRows<6>(6 * static_cast<Eigen::Index>(i)).setZero();
+      }
+      const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(P.rows(), P.cols()) - K * H;
+      const Eigen::MatrixXd after =
+          left * P * left.transpose() + K * sensor.asDiagonal() * K.transpose();
       const double expected = worst.gradient.dot(J * after * J.transpose() * worst.gradient);
       CHECK(std::abs(shares.after[k] - expected) < 1e-6 * largest);
     }
