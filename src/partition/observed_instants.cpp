@@ -47,8 +47,8 @@ void count_twice(std::vector<ObservedEdge>& edges, const std::string& source) {
   }
 }
 
-// The newest instant of which errors are left, as in their names; empty: there is none.
-std::string newest_instant(const std::vector<ObservedEdge>& edges) {
+// The newest instant of which errors are left.
+std::optional<std::int64_t> newest_instant(const std::vector<ObservedEdge>& edges) {
   std::optional<std::int64_t> newest;
   for (const ObservedEdge& edge : edges) {
     for (const CommonError& one : edge.X_PC.common_errors) {
@@ -58,7 +58,7 @@ std::string newest_instant(const std::vector<ObservedEdge>& edges) {
       if (read.ec == std::errc()) newest = std::max(newest.value_or(instant), instant);
     }
   }
-  return newest ? std::to_string(*newest) : std::string();
+  return newest;
 }
 
 // If one observation has taken a source for that of an instant, its error was the source's.
@@ -153,16 +153,19 @@ void ObservedInstants::name_between(std::vector<ObservedEdge>& edges) {
 
 // What is merged counts as independent: that is enough for any relation of errors at one instant.
 void ObservedInstants::merge_others(std::vector<ObservedEdge>& edges) const {
-  // A path of static edges has no instant. The next observation may be of the newest one again.
-  const std::string here =
-      path_.stamp ? std::to_string(nanoseconds(*path_.stamp)) : newest_instant(edges);
+  // A path of static edges has no instant. The next observation may be of the newest one again,
+  // also after one that came late.
+  const std::optional<std::int64_t> left = newest_instant(edges);
+  const std::int64_t here = path_.stamp ? nanoseconds(*path_.stamp) : left.value_or(0);
+  const std::string kept[] = {std::to_string(here),
+                              std::to_string(std::max(here, left.value_or(here)))};
   std::map<std::pair<std::string, std::string>, std::set<std::string>> names;  // of what is merged
   const auto of = [](const std::string& name) {
     return std::pair(std::string(said_source(name)), std::string(instant_in(name)));
   };
   const auto is_other = [&](const std::string& name) {
     const std::string_view instant = instant_in(name);
-    return !instant.empty() && instant != here;
+    return !instant.empty() && instant != kept[0] && instant != kept[1];
   };
   for (const ObservedEdge& edge : edges) {
     for (const CommonError& one : edge.X_PC.common_errors) {

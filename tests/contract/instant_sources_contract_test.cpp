@@ -183,6 +183,9 @@ TEST_CASE("instants: edges of several owners with one source share its error at 
   check_honest(ratios({{"left", 5}, {"right", 5}, {"left", 5}}, kAll), 8);
   // Those that come late, too.
   check_honest(ratios({{"left", 5}, {"left", 3}, {"right", 3}}, kAll), 30);
+  // The newest instant is observed again after one that came late.
+  check_honest(ratios({{"left", 5}, {"left", 3}, {"right", 5}}, kAll), 30);
+  check_honest(ratios({{"left", 5}, {"left", 3}, {"left", 5}, {"right", 5}}, kAll), 30);
 }
 
 TEST_CASE("instants: an observation of static edges keeps an error that of its instant") {
