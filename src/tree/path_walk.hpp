@@ -200,10 +200,23 @@ Result<void> compute_newest(const Ends& ends, Others& others, Pose& X_AB) {
   return walk_newest(ends, PathLookup::Absent::kEnds, Order::kSecond, others, met, X_AB);
 }
 
+/// Whether what observations have removed is better subtracted at A: as seen from B, as from the
+/// centre of the Earth, levers make the errors so large that the difference would lose its digits.
+[[nodiscard]] inline bool cancels_at_a(const Belief& X_AB) {
+  constexpr double kMuchLarger = 1e6;
+  const auto& errors = X_AB.common_errors;
+  const bool any = std::any_of(errors.begin(), errors.end(),
+                               [](const CommonError& one) { return one.subtracts; });
+  if (!any) return false;
+  const Covariance at_a = inverse(Transform{X_AB.pose, X_AB.own}).covariance.of_specified();
+  return X_AB.own.matrix().trace() > kMuchLarger * at_a.matrix().trace();
+}
+
 /// What a query asks for.
+/// @param turned  of the path from B to A instead
 template <class Others>
 Result<void> compute_queried(const Ends& ends, const Query& query, Others& others,
-                             StampedTransform& X_AB) {
+                             StampedTransform& X_AB, bool turned = false) {
   PathLookup::Met met;
   PathCorrelation correlation;
   const Output output{X_AB, correlation};
@@ -224,7 +237,16 @@ Result<void> compute_queried(const Ends& ends, const Query& query, Others& other
   X_AB.basis.order = query.order;
   const bool complete = X_AB.covariance.complete();
   if (correlation.empty() && complete) return {};
-  X_AB = collapsed(belief_of(X_AB, correlation), query.order, at);
+  const Belief whole = belief_of(X_AB, correlation);
+  if (!turned && query.order == Order::kSecond && cancels_at_a(whole)) {
+    StampedTransform X_BA;
+    auto back = compute_queried({ends.b, ends.a, ends.commit}, query, others, X_BA, true);
+    if (!back) return back;
+    std::reverse(X_BA.basis.unspecified.begin(), X_BA.basis.unspecified.end());
+    X_AB = {inverse(X_BA), X_BA.stamp, std::move(X_BA.basis)};
+    return {};
+  }
+  X_AB = collapsed(whole, query.order, at);
   if (!complete) {
     X_AB.basis.unspecified = unspecified_edges(ends, at ? nanoseconds(*at) : kAlways, others);
   }

@@ -168,6 +168,44 @@ TEST_CASE("Segments have their correlation so a caller can compose the whole pat
   CHECK(uncorrelated->correlations.empty());
 }
 
+// At the centre of the Earth, the errors before the observation are as large as 100,000 km.
+TEST_CASE("What was observed is as certain seen from the centre of the Earth") {
+  Random random(663);
+  INFO("seed " << random.seed());
+  Forest forest{[] { return at(0ms); }};
+  Pose far = random.pose();
+  far = Pose::trusted(far.rotation(), 6.4e6 * random.direction());
+  REQUIRE(forest.add("earth", "", {}));
+  REQUIRE(forest.add("map", "earth", Transform::exact(far)));
+  std::vector<ObservedEdge> edges;
+  Pose X_MB;
+  for (const auto& [id, parent] : {std::pair("a", "map"), {"b", "a"}}) {
+    const Transform X{random.pose(), random.covariance(0.05, 0.05)};
+    REQUIRE(forest.add(id, parent, X));
+    edges.push_back({with(X, {}), ObservedEdge::Way::kDown});
+    X_MB = X_MB * X.pose;
+  }
+  const Covariance R = random.covariance(1e-3, 1e-4);
+  const auto found = observe(edges, {X_MB, R}, "observed:1", {1.0, true});
+  REQUIRE(found);
+  std::vector<Revision> revisions;
+  for (const std::size_t i : {0U, 1U}) {
+    const Belief& X = found->edges[i].X_PC;
+    revisions.push_back({i == 0 ? "a" : "b", {X.pose, X.own}, {false, X.common_errors, {}}});
+  }
+  REQUIRE(forest.revise(revisions, std::nullopt, UINT64_MAX));
+  // Of one pose, whose prior is that of both edges: P - P (P + R)⁻¹ P, in the axes of b.
+  const Matrix6d back = adjoint(edges[1].X_PC.pose.inverse());
+  const Matrix6d P =
+      edges[1].X_PC.own.matrix() + back * edges[0].X_PC.own.matrix() * back.transpose();
+  const Matrix6d left = P - P * (P + R.matrix()).inverse() * P;
+  const auto X = forest.lookup("b", "earth");
+  REQUIRE(X);
+  const Matrix6d in_b = inverse(*X).covariance.of_specified().matrix();
+  const Twist scale = left.diagonal().cwiseSqrt().cwiseInverse();
+  CHECK((scale.asDiagonal() * (in_b - left) * scale.asDiagonal()).norm() < 1e-3);
+}
+
 TEST_CASE("A revision of static edges holds until their next update") {
   Random random(656);
   INFO("seed " << random.seed());
