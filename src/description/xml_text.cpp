@@ -1,7 +1,10 @@
 #include "description/xml_text.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstddef>
+#include <optional>
 #include <string_view>
 
 #include "tfdude/base/id.hpp"
@@ -22,25 +25,43 @@ std::string reason(const tinyxml2::XMLDocument& document) {
   return name;
 }
 
-// The line of an element with more attributes than any URDF has; 0: there is none. TinyXML compares
-// each with all before it, so a million of them would take hours.
-int line_of_too_many_attributes(std::string_view text) {
-  constexpr std::size_t kMost = 256;
-  const auto skip_to = [&text](std::size_t from, std::string_view end) {
-    const auto at = text.find(end, from);
-    return at == std::string_view::npos ? text.size() : at + end.size();
-  };
+int line_at(std::string_view text, std::size_t at) {
+  const auto end = text.begin() + static_cast<std::ptrdiff_t>(at);
+  return 1 + static_cast<int>(std::count(text.begin(), end, '\n'));
+}
+
+std::size_t after(std::string_view text, std::string_view end, std::size_t from) {
+  const auto at = text.find(end, from);
+  return at == std::string_view::npos ? text.size() : at + end.size();
+}
+
+// Where TinyXML goes on after the markup at `at`, if it is no tag of an element; else `at`. Only in
+// tags it knows quotes.
+std::size_t after_other_markup(std::string_view text, std::size_t at) {
+  constexpr std::array<std::array<std::string_view, 2>, 4> kKinds = {
+      {{"<?", "?>"}, {"<!--", "-->"}, {"<![CDATA[", "]]>"}, {"<!", ">"}}};
+  for (const auto& [begin, end] : kKinds) {
+    if (text.compare(at, begin.size(), begin) == 0) return after(text, end, at + begin.size());
+  }
+  return at;
+}
+
+struct TooMuch {
+  std::size_t at;
+  const char* what;
+};
+
+// TinyXML compares each attribute with all before it, so a million of them would take hours, and
+// keeps more than a hundred bytes of each element.
+std::optional<TooMuch> find_too_much(std::string_view text) {
+  constexpr std::size_t kMostAttributes = 256;
+  constexpr std::size_t kMostTags = 2'000'000;
+  std::size_t tags = 0;
   for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
-    const std::string_view rest = text.substr(at);
-    if (rest.rfind("<!--", 0) == 0) {
-      at = skip_to(at, "-->");
-      continue;
-    }
-    if (rest.rfind("<![CDATA[", 0) == 0) {
-      at = skip_to(at, "]]>");
-      continue;
-    }
     const std::size_t begin = at;
+    if (++tags > kMostTags) return TooMuch{begin, "has more than 2000000 tags"};
+    at = after_other_markup(text, begin);
+    if (at != begin) continue;
     std::size_t attributes = 0;
     for (++at; at < text.size() && text[at] != '>'; ++at) {
       if (text[at] == '=') ++attributes;
@@ -48,11 +69,11 @@ int line_of_too_many_attributes(std::string_view text) {
       at = std::min(text.find(text[at], at + 1), text.size());
       if (at == text.size()) break;
     }
-    if (attributes <= kMost) continue;
-    return 1 + static_cast<int>(
-                   std::count(text.begin(), text.begin() + static_cast<long>(begin), '\n'));
+    if (attributes > kMostAttributes) {
+      return TooMuch{begin, "an element has more than 256 attributes"};
+    }
   }
-  return 0;
+  return std::nullopt;
 }
 
 // The line of a document type that declares entities, whose names TinyXML would leave as they are;
@@ -74,11 +95,10 @@ int line_of_entities(const tinyxml2::XMLDocument& document) {
 Result<const tinyxml2::XMLElement*> parse_xml(tinyxml2::XMLDocument& document,
                                               const std::string& text, const std::string& file) {
   if (const auto zero = text.find('\0'); zero != std::string::npos) {
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(zero), '\n');
-    return file_error(Errc::kConfig, file, static_cast<int>(line), "not XML: holds a zero byte");
+    return file_error(Errc::kConfig, file, line_at(text, zero), "not XML: holds a zero byte");
   }
-  if (const int line = line_of_too_many_attributes(text); line > 0) {
-    return file_error(Errc::kTooMuch, file, line, "an element has more than 256 attributes");
+  if (const auto found = find_too_much(text)) {
+    return file_error(Errc::kTooMuch, file, line_at(text, found->at), found->what);
   }
   if (document.Parse(text.data(), text.size()) == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) {
     return fail(Errc::kConfig, file + ": is empty");

@@ -65,6 +65,26 @@ TEST_CASE("urdf: an element with attributes without end is rejected at once") {
   CHECK(ids_of(frames_of(comment + "--><link name=\"x\"/></robot>")) == "x");
 }
 
+// TinyXML ends a declaration at its end, whatever quotes are in it, and a comment not at its begin.
+TEST_CASE("urdf: nothing before an element hides its attributes") {
+  std::string many = "<robot name=\"r\"";
+  for (int i = 0; i < 300; ++i) many += " a" + std::to_string(i) + "=\"\"";
+  for (const std::string before : {"<!'>", "<?xml version=\"1.0\" '?>", "<!--'-->", "<!--> -->"}) {
+    INFO(before);
+    refused(before + many + "/>", "r.urdf:1: an element has more than 256 attributes",
+            Errc::kTooMuch);
+    CHECK(ids_of(frames_of(before + "<robot name=\"r\"><link name=\"x\"/></robot>")) == "x");
+  }
+}
+
+TEST_CASE("urdf: tags without end are rejected at once") {
+  std::string many = "<robot name=\"r\">\n";
+  for (int i = 0; i < 2'000'000; ++i) many += "<a/>";
+  const auto frames = tfdude::parse_urdf(many, {"r.urdf"});
+  REQUIRE_FALSE(frames);
+  CHECK(frames.error().message == "r.urdf:2: has more than 2000000 tags");
+}
+
 TEST_CASE("urdf: elements that do not concern frames are ignored") {
   const std::string junk =
       "<inertial><mass value=\"heavy\"/><inertia ixx=\"\"/></inertial>"
