@@ -343,7 +343,7 @@ Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
   const Calls calls(*tokens, file);
   const Variables variables(*tokens, conditions);
   std::vector<PythonArguments> found;
-  std::size_t read = kNone;  // each bracket is read once, so that the work is bounded
+  std::vector<bool> read(tokens->size());  // each bracket is read once: the work is bounded
   for (std::size_t i = 0; i < tokens->size(); ++i) {
     const Token& token = (*tokens)[i];
     const bool is_string = token.kind == Token::Kind::kString;
@@ -351,10 +351,10 @@ Result<std::vector<PythonArguments>> python_arguments(const std::string& text,
     const bool is_text = is_string || token.text.find('\\') != std::string::npos;
     if (!is_program && !(is_text && mentions_publisher(token.text))) continue;
     if (calls.is_about_text(i, conditions)) continue;
-    if (is_program && token.other != kNone && token.other == read) continue;
+    if (is_program && token.other != kNone && read[token.other]) continue;
     std::optional<PythonArguments> arguments;
     if (is_program && token.other != kNone) {
-      read = token.other;
+      read[token.other] = true;
       auto around = calls.around(token.other, i);
       if (!around) return tl::unexpected(std::move(around.error()));
       arguments = *std::move(around);

@@ -106,6 +106,17 @@ TEST_CASE("launch file: what only tells of the program in Python is no start") {
   }
 }
 
+// Once, a file of 1 MB that names the program again after each list took all memory.
+TEST_CASE("launch file: arguments of a call in Python are read once") {
+  const auto start = [](const std::string& frames) {
+    return "['static_transform_publisher', '0', '0', '0', '0', '0', '0', " + frames + "]";
+  };
+  CHECK(edges_of("LaunchDescription\nf(arguments=['0', '0', '0', '0', '0', '0', 'a', 'b'], "
+                 "'static_transform_publisher', " +
+                 start("'c', 'd'") + ", 'static_transform_publisher', " + start("'e', 'f'") +
+                 ", 'static_transform_publisher')\n") == "a>b c>d e>f ");
+}
+
 TEST_CASE("launch file: a start in XML or YAML that is not read is rejected by name") {
   const auto xml = [](const std::string& other) {
     return "<launch><node pkg=\"tf2_ros\" exec=\"static_transform_publisher\" args=\"0 0 0 0 0 0 a "
