@@ -97,6 +97,11 @@ bool is_edge(std::string_view id, std::string_view parent) {
   return check_id(id, "id") && check_id(parent, "parent") && id != parent;
 }
 
+bool has_ids(const JointInfo& joint) {
+  return check_id(joint.name, "joint") && check_id(joint.frame, "frame") &&
+         (!joint.mimic || check_id(joint.mimic->joint, "joint"));
+}
+
 }  // namespace
 
 WatchedValue RecordedValue::watched(std::uint32_t frame) const {
@@ -281,7 +286,7 @@ Result<RecordedFrames> decode_frames(std::string_view message) {
   all.partition = reader.text();
   all.incarnation = reader.u64();
   all.reachable = reader.flag();
-  all.why = reader.text();
+  all.why = printable(reader.text());
   all.complete = reader.flag();
   all.repeats = reader.flag();
   const std::uint32_t count = reader.count(2 * kLeastText);
@@ -295,7 +300,8 @@ Result<RecordedFrames> decode_frames(std::string_view message) {
   }
   const std::uint32_t removed = reader.count(kLeastText);
   for (std::uint32_t i = 0; i < removed && reader.good(); ++i) {
-    all.removed.emplace_back(reader.text());
+    const std::string_view id = reader.text();
+    if (check_id(id, "id")) all.removed.emplace_back(id);
   }
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("frames");
   return all;
@@ -353,7 +359,7 @@ Result<RecordedJoints> decode_joints(std::string_view message) {
     joint.outside = reader.u64();
     joint.refused = reader.u64();
     if (type < 1 || type > 3) return invalid("joints");
-    all.joints.push_back(std::move(joint));
+    if (has_ids(joint)) all.joints.push_back(std::move(joint));
   }
   if (!reader.good() || !check_partition_name(all.partition)) return invalid("joints");
   return all;
@@ -379,10 +385,14 @@ Result<Change> decode_event(std::string_view message) {
   change.frame = reader.text();
   change.parent = reader.text();
   change.rival = reader.text();
-  change.message = reader.text();
+  change.message = printable(reader.text());
   change.time = checked_time(reader.i64());
   change.stopped = reader.flag();
-  if (!reader.good()) return invalid("events");
+  const auto is_none_or_id = [](const std::string& id) { return id.empty() || check_id(id, "id"); };
+  if (!reader.good() || !check_partition_name(change.partition) || !is_none_or_id(change.frame) ||
+      !is_none_or_id(change.parent) || !is_none_or_id(change.rival)) {
+    return invalid("events");
+  }
   for (auto i = ChangeKind::kPartitionUp; i <= ChangeKind::kJointConflict;
        i = static_cast<ChangeKind>(static_cast<int>(i) + 1)) {
     if (to_string(i) != kind) continue;

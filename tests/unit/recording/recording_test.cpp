@@ -184,6 +184,49 @@ TEST_CASE("recording: the code of an error is that of files, not that of the sta
   CHECK(code_of(RecordingWriter::create("/none/robot.mcap", at(1))) == "invalid_input");
 }
 
+// What programs print of a file must not steer the terminal.
+TEST_CASE("recording: nothing that is read holds a control character") {
+  const std::string steers = "\x1b[2J";
+  const std::string shown = "\\x1b[2J";
+  std::string bytes;
+  encode(RecordedFrames{"robot", 1, false, steers, true, false, {}, {steers, "hand"}}, bytes);
+  const auto frames = decode_frames(bytes);
+  REQUIRE(frames);
+  CHECK(frames->why == shown);
+  CHECK(frames->removed == std::vector<std::string>{"hand"});
+
+  const auto joint = [](const std::string& name, const std::string& frame) {
+    JointInfo info;
+    info.name = name;
+    info.frame = frame;
+    info.type = JointType::kRevolute;
+    return info;
+  };
+  RecordedJoints joints{"robot", false, {joint("a", "b"), joint(steers, "b"), joint("c", steers)}};
+  joints.joints.push_back(joint("d", "e"));
+  joints.joints.back().mimic = Mimic{steers, 1, 0};
+  bytes.clear();
+  encode(joints, bytes);
+  const auto read = decode_joints(bytes);
+  REQUIRE(read);
+  REQUIRE(read->joints.size() == 1);
+  CHECK(read->joints.front().name == "a");
+
+  const auto event = [&](const Change& change) {
+    bytes.clear();
+    encode(change, bytes);
+    return decode_event(bytes);
+  };
+  const Change down{ChangeKind::kPartitionDown, "robot", "", "", "", steers};
+  REQUIRE(event(down));
+  CHECK(event(down)->message == shown);
+  for (auto field : {&Change::partition, &Change::frame, &Change::parent, &Change::rival}) {
+    Change bad = down;
+    bad.*field = steers;
+    CHECK_FALSE(event(bad));
+  }
+}
+
 TEST_CASE("recording: a compression that cannot be read is named") {
   std::string file = file_of_ros("tf2_msgs/msg/TFMessage", "", "/tf");
   for (auto at = file.find("zstd"); at != std::string::npos; at = file.find("zstd", at)) {
