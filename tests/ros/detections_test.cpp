@@ -87,10 +87,18 @@ TEST_CASE("ros detections: what is not seen for a while is due, and objects are 
   CHECK(import.due(now + milliseconds(2000)).empty());
   std::vector<std::string> many;
   for (std::size_t i = 0; i < kMostObjects + 5; ++i) many.push_back("m" + std::to_string(i));
-  const auto out = import.take(message(5, many));
-  CHECK(out.all.size() == kMostObjects);
-  CHECK(import.counts().beyond == 5);
-  CHECK(out.reports.size() == 1);
+  for (const std::int64_t stamp : {0, 5}) {
+    DetectionImport other(settings());
+    CHECK(other.take(message(stamp, many)).all.size() == kMostObjects);
+    CHECK(other.take(message(stamp, {"one more"})).all.empty());
+    CHECK(other.counts().beyond == 6);
+  }
+  // Of long names only the part that the log shows.
+  const std::string name(400, 'x');
+  CHECK(import.take(message(5, {name + "a", name + "a"})).reports.size() == 1);
+  CHECK(import.take(message(5, {name + "b", name + "b"})).reports.empty());
+  CHECK(import.take(message(5, {name + "c"})).reports.size() == 1);
+  CHECK(import.take(message(5, {name + "d"})).reports.empty());
 }
 
 TEST_CASE("ros detections: a frame that observations place is static, and /tf does not move it") {

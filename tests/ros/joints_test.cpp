@@ -96,6 +96,9 @@ TEST_CASE("ros joints: measured joints are sent, unless a node of ROS publishes 
   JointExportSettings settings;
   settings.prefix = "r1/";
   JointExport out(settings);
+  for (int i = 0; i < 10'000; ++i) {
+    out.heard({Time(), {std::string(256, 'x') + std::to_string(i)}, {0}});  // names of no joint
+  }
   out.heard({Time(), {"wrist"}, {0}});
   JointState message;
   out.add(

@@ -234,6 +234,27 @@ TEST_CASE(
   CHECK(rig.retry().empty());
 }
 
+TEST_CASE("ros import: of what others publish no more is kept than is of use") {
+  Rig rig;
+  rig.holdings["base"] = {Holding::Kind::kOther, "robot"};
+  (void)rig.take({edge("world", "/base", 1, 1), edge("world", "//base", 1, 2)}, "w1", true);
+  for (int i = 0; i < 10'050; ++i) {
+    const std::string id = "f" + std::to_string(i);
+    rig.holdings[id] = {Holding::Kind::kOther, "robot"};
+    (void)rig.take({edge("world", id, 1)}, "w1", true);
+  }
+  rig.holdings.clear();
+  const auto changes = rig.retry();
+  CHECK(changes.edits.size() == 10'000 + 1);
+  REQUIRE(changes.edits[1].id == "base");
+  CHECK(changes.edits[1].X_PC->pose.translation().x() == 2);
+  // Of long names only the part that the log shows.
+  Rig other;
+  const std::string name(400, 'x');
+  CHECK(other.take({edge("world", name + "a", 1)}).reports.size() == 1);
+  CHECK(other.take({edge("world", name + "b", 1)}).reports.empty());
+}
+
 TEST_CASE("ros import: wrong names and values are counted and reported once, by name") {
   Rig rig;
   auto twisted = edge("a", "b", 1);

@@ -22,7 +22,7 @@ DetectionImport::Sightings DetectionImport::take(const Detections& message) {
       ++counts_.left_out;
     } else if (count[one.id] > 1) {
       ++counts_.ambiguous;
-      report_once("ambiguous " + one.id,
+      report_once("ambiguous " + quote(one.id),
                   "not taken: object " + quote(one.id) + ": a message has several of it", out);
     } else {
       take_one({message.stamp, message.frame, one.pose, one.covariance}, one.id, out);
@@ -47,21 +47,21 @@ void DetectionImport::take_one(const PoseWithCovariance& pose, const std::string
   auto measured = pose_message(pose, name, settings_.prefix, settings_.variances);
   if (!measured) {
     ++counts_.invalid;
-    report_once("invalid " + object,
+    report_once("invalid " + quote(object),
                 "not taken: object " + quote(object) + ": " + measured.error().message, out);
     return;
   }
   const std::string& id = measured->b;
-  const auto before = stamps_seen_.find(id);
-  if (before == stamps_seen_.end() && stamps_seen_.size() >= kMostObjects) {
+  if (stamps_seen_.size() >= kMostObjects && stamps_seen_.count(id) == 0) {
     ++counts_.beyond;
     report_once("beyond", "not taken: more than " + std::to_string(kMostObjects) + " objects", out);
     return;
   }
+  std::optional<Time>& before = stamps_seen_[id];
   if (measured->stamp) {
     // The same sighting twice would count as two.
-    if (before != stamps_seen_.end() && before->second == *measured->stamp) return stamps_.same();
-    stamps_seen_[id] = *measured->stamp;
+    if (before == measured->stamp) return stamps_.same();
+    before = measured->stamp;
   } else {
     const auto report = stamps_.unstamped("object " + quote(object), "taken as seen now");
     if (report) out.reports.push_back(*report);

@@ -85,8 +85,8 @@ class DetectionImport {
   const DetectionsIn settings_;
   DetectionCounts counts_;
   StampReports stamps_;
-  std::map<std::string, SteadyTime> last_seen_;  // by the id here
-  std::map<std::string, Time> stamps_seen_;      // of the last sighting, by the same
+  std::map<std::string, SteadyTime> last_seen_;             // by the id here
+  std::map<std::string, std::optional<Time>> stamps_seen_;  // of the last sighting, by the same
   std::set<std::string> reported_;
 };
 

@@ -59,7 +59,7 @@ void JointExport::heard(const JointState& message) {
   // Names that nobody has here need not be known.
   constexpr std::size_t kMost = 10'000;
   for (const std::string& name : message.names) {
-    if (from_ros_.size() < kMost) from_ros_.insert(name);
+    if (from_ros_.size() < kMost && check_id(name, "joint")) from_ros_.insert(name);
   }
 }
 

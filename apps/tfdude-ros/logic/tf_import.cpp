@@ -19,6 +19,9 @@ constexpr std::chrono::seconds kJump{1};
 // So many reports are remembered; what happens after that is only counted.
 constexpr std::size_t kMaxReports = 1000;
 
+// Static transforms that wait for a change of the structure; each change takes all of them again.
+constexpr std::size_t kMaxHeldBack = 10'000;
+
 TfImport::Batch& batch_of(std::optional<Time> stamp, const std::string& id,
                           std::vector<TfImport::Batch>& batches) {
   const auto has = [&](const TfImport::Batch& batch) {
@@ -104,13 +107,28 @@ void TfImport::take_one(const TransformStamped& transform, const std::string& wr
       may_take(*one, writer, who_holds, changes) && has_parent(*one, who_holds, changes);
   if (!may) {
     ++counts_.owned;
-    if (is_static) held_back_[transform.child] = {transform, writer};
+    if (is_static) hold_back(*one, transform, writer, changes);
     return;
   }
   Entry& entry = entries_[one->id];
   if (!may_write(*one, writer, now, entry, changes)) return;
   apply(*one, writer, now, entry, changes);
   ++counts_.taken;
+}
+
+void TfImport::hold_back(const Checked& one, const TransformStamped& transform,
+                         const std::string& writer, Changes& changes) {
+  if (held_back_.size() >= kMaxHeldBack && held_back_.count(one.id) == 0) {
+    return report_once("held back",
+                       "not taken: more than " + std::to_string(kMaxHeldBack) +
+                           " static transforms of frames of others",
+                       changes);
+  }
+  TransformStamped held = transform;
+  // The slashes before a name may be many.
+  held.parent = without_slashes(transform.parent);
+  held.child = without_slashes(transform.child);
+  held_back_[one.id] = {std::move(held), writer};
 }
 
 std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transform, bool is_static,
@@ -123,7 +141,8 @@ std::optional<TfImport::Checked> TfImport::check(const TransformStamped& transfo
   if (!id || !parent) {
     ++counts_.names;
     const std::string& why = id ? parent.error().message : id.error().message;
-    report_once("name " + transform.child + '\n' + transform.parent, "not taken: " + why, changes);
+    report_once("name " + quote(transform.child) + quote(transform.parent), "not taken: " + why,
+                changes);
     return std::nullopt;
   }
   const auto pose = pose_of(transform.pose);

@@ -177,6 +177,8 @@ class TfImport {
   void take_one(const TransformStamped& transform, const std::string& writer, bool is_static,
                 SteadyTime now, const WhoHolds& who_holds, std::optional<Time> arrival,
                 Changes& changes);
+  void hold_back(const Checked& one, const TransformStamped& transform, const std::string& writer,
+                 Changes& changes);
   [[nodiscard]] std::optional<Checked> check(const TransformStamped& transform, bool is_static,
                                              Changes& changes);
   /// Dates a sample without a stamp. @return whether that is possible
@@ -209,7 +211,7 @@ class TfImport {
 
   ImportSettings settings_;
   std::unordered_map<std::string, Entry> entries_;
-  std::map<std::string, HeldBack> held_back_;  // static transforms, by the child's name in ROS
+  std::map<std::string, HeldBack> held_back_;  // static transforms, by the child's id
   std::set<std::string> given_up_;
   std::set<std::string> reported_;
   std::optional<SteadyTime> jump_reported_;
