@@ -1,5 +1,6 @@
 #include "tfdude-ros/logic/tf_import.hpp"
 
+#include <chrono>
 #include <map>
 #include <string>
 #include <vector>
@@ -92,6 +93,17 @@ TEST_CASE("ros import: transforms of one stamp are one batch, in the order of th
       text(rig.take({edge("a", "b", 1), edge("b", "c", 1), edge("c", "d", 2), edge("a", "b", 2),
                      edge("a", "b", 2)})) ==
       "root a; add b under a; add c under b; add d under c; at 1000 b c; at 2000 d b; at 2000 b; ");
+}
+
+TEST_CASE("ros import: the work for a message grows with its size, not with the square of it") {
+  Rig rig;
+  TfMessage message;
+  for (int i = 0; i < 40'000; ++i) message.push_back(edge("world", "f" + std::to_string(i), 1));
+  const auto start = std::chrono::steady_clock::now();
+  const auto changes = rig.take(message);
+  CHECK(std::chrono::steady_clock::now() - start < seconds(1));
+  REQUIRE(changes.batches.size() == 1);
+  CHECK(changes.batches[0].edges.size() == message.size());
 }
 
 TEST_CASE("ros import: static transforms have no stamp, and are written only if they change") {

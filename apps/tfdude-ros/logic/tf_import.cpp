@@ -22,16 +22,14 @@ constexpr std::size_t kMaxReports = 1000;
 // Static transforms that wait for a change of the structure; each change takes all of them again.
 constexpr std::size_t kMaxHeldBack = 10'000;
 
-TfImport::Batch& batch_of(std::optional<Time> stamp, const std::string& id,
-                          std::vector<TfImport::Batch>& batches) {
-  const auto has = [&](const TfImport::Batch& batch) {
-    return std::any_of(batch.edges.begin(), batch.edges.end(),
-                       [&](const EdgeUpdate& edge) { return edge.id == id; });
-  };
-  if (batches.empty() || batches.back().stamp != stamp || has(batches.back())) {
+void add_value(std::optional<Time> stamp, const EdgeUpdate& edge, TfImport::Changes& changes) {
+  auto& batches = changes.batches;
+  std::size_t& last = changes.last_batches[edge.id];
+  if (batches.empty() || batches.back().stamp != stamp || last == batches.size()) {
     batches.push_back({stamp, {}});
   }
-  return batches.back();
+  batches.back().edges.push_back(edge);
+  last = batches.size();
 }
 
 bool equal(const Pose& a, const Pose& b) {
@@ -174,7 +172,7 @@ void TfImport::extend(const std::string& id, Time stamp, Changes& changes) {
   const auto found = entries_.find(id);
   if (found == entries_.end() || !found->second.is_held() || stamp <= found->second.newest) return;
   found->second.newest = stamp;
-  batch_of(stamp, id, changes.batches).edges.push_back({id, {found->second.X_PC, {}}});
+  add_value(stamp, {id, {found->second.X_PC, {}}}, changes);
 }
 
 TfImport::Changes TfImport::hold(const TransformStamped& transform, SteadyTime now,
@@ -335,10 +333,10 @@ void TfImport::apply(const Checked& one, const std::string& writer, SteadyTime n
     // While the clock stands still, the sample before is replaced.
     const bool replaces = !one.is_stamped && !edit && !entry.is_static && one.stamp <= entry.newest;
     const auto stamp = replaces ? std::nullopt : std::optional<Time>(one.stamp);
-    batch_of(stamp, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+    add_value(stamp, {one.id, one.X_PC}, changes);
     if (one.is_stamped) extend(one.parent, one.stamp, changes);
   } else if (!edit && !equal(entry.X_PC, one.X_PC.pose)) {
-    batch_of(std::nullopt, one.id, changes.batches).edges.push_back({one.id, one.X_PC});
+    add_value(std::nullopt, {one.id, one.X_PC}, changes);
   }
   entry.newest = edit ? one.stamp : std::max(entry.newest, one.stamp);
   entry.exists = true;

@@ -84,6 +84,8 @@ class TfImport {
     std::vector<Edit> edits;
     std::vector<Batch> batches;
     std::vector<std::string> reports;  ///< each once, for the log
+    /// How many batches there were when one last got a value of this frame.
+    std::unordered_map<std::string, std::size_t> last_batches;
 
     [[nodiscard]] bool empty() const { return edits.empty() && batches.empty(); }
   };
