@@ -89,14 +89,28 @@ class Import {
                                             quote(found->second.partition));
     }
     for (const FrameSpec& frame : frames_) {
-      std::size_t& steps = depths_[frame.id];
-      for (auto at = parents.find(frame.id); at != parents.end(); at = parents.find(at->second)) {
-        if (++steps <= parents.size()) continue;
-        return fail(Errc::kCycle, "frame " + quote(frame.id) + ": its new parent " +
-                                      quote(frame.parent) + " lies below it");
-      }
+      if (find_depth(frame.id, parents)) continue;
+      return fail(Errc::kCycle, "frame " + quote(frame.id) + ": its new parent " +
+                                    quote(frame.parent) + " lies below it");
     }
     return {};
+  }
+
+  // Notes the depths of a frame and those above it, up to one whose depth is known: 0 means that it
+  // is being sought. @return whether there is no cycle
+  [[nodiscard]] bool find_depth(const std::string& id,
+                                const std::map<std::string, std::string>& parents) {
+    std::vector<std::size_t*> path;
+    std::size_t depth = 0;
+    for (auto at = parents.find(id); at != parents.end(); at = parents.find(at->second)) {
+      const auto [found, is_new] = depths_.try_emplace(at->first, 0);
+      depth = found->second;
+      if (!is_new && depth == 0) return false;
+      if (!is_new) break;
+      path.push_back(&found->second);
+    }
+    for (auto one = path.rbegin(); one != path.rend(); ++one) **one = ++depth;
+    return true;
   }
 
   // Which edges that keep their parent have other error sources before or after. Those of an edge

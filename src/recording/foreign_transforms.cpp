@@ -10,6 +10,9 @@ namespace {
 // Samples that go back by more are from a clock that has jumped back, as in the bridge.
 constexpr std::chrono::seconds kJumpBack{1};
 
+// More could make each transform cost as much as all before it.
+constexpr std::size_t kMostAbove = 10'000;
+
 constexpr std::size_t kMostStamps = 2'000'000;
 constexpr std::size_t kLeastStampsOfEdge = 64;
 constexpr std::size_t kMostStampsOfEdge = 4096;
@@ -37,21 +40,22 @@ void ForeignTransforms::take(std::vector<RecordedValue>& values, TransformCounts
 }
 
 bool ForeignTransforms::takes(RecordedValue& value, TransformCounts& counts, const Report& report) {
-  const std::string& id = value.edge->id;
-  const auto known = edges_.find(id);
-  const bool moves = known == edges_.end() || known->second.parent != value.edge->parent;
-  if (moves && is_below(value.edge->parent, id)) {
-    ++counts.cycles;
-    report("the transform of frame " + quote(id) + " is left out: its parent " +
-           quote(value.edge->parent) + " is below it");
-    return false;
+  Edge& edge = edges_[value.edge->id];
+  Edge& parent = edges_[value.edge->parent];
+  if (edge.parent != &parent) {
+    if (const char* why = why_not_below(parent, edge)) {
+      ++counts.cycles;
+      report("the transform of frame " + quote(value.edge->id) + " is left out: its parent " +
+             quote(value.edge->parent) + " is below " + why);
+      return false;
+    }
+    edge = Edge{&parent, edge.is_parent};
+    parent.is_parent = true;
   }
-  Edge& edge = edges_[id];
-  if (moves) edge = Edge{value.edge->parent};
   if (value.stamp) return takes_sample(value, edge, counts, report);
   // From now on it is static, without the samples from before.
   if (!edge.is_static) value.more().begins = Covariance();
-  edge = Edge{value.edge->parent};
+  edge = Edge{&parent, edge.is_parent};
   return true;
 }
 
@@ -63,7 +67,7 @@ bool ForeignTransforms::takes_sample(RecordedValue& value, Edge& edge, Transform
   if (newest - stamp > kJumpBack) {
     ++counts.jumps;
     report(who() + ": time has jumped back by more than a second: its samples before are dropped");
-    edge = Edge{edge.parent};
+    edge = Edge{edge.parent, edge.is_parent};
     value.more().begins = Covariance();
   } else if (value.dated) {
     stamp = std::max(stamp, newest);  // while the clock stands still, the last one counts
@@ -107,13 +111,14 @@ void ForeignTransforms::forget_some(Edge& edge) const {
   }
 }
 
-bool ForeignTransforms::is_below(std::string frame, const std::string& top) const {
-  while (frame != top) {
-    const auto edge = edges_.find(frame);
-    if (edge == edges_.end()) return false;
-    frame = edge->second.parent;
+const char* ForeignTransforms::why_not_below(const Edge& parent, const Edge& edge) {
+  if (!edge.is_parent) return nullptr;
+  std::size_t above = 0;
+  for (const Edge* at = &parent; at != nullptr; at = at->parent) {
+    if (at == &edge) return "it";
+    if (++above > kMostAbove) return "more than 10000 others";
   }
-  return true;
+  return nullptr;
 }
 
 }  // namespace tfdude::recording

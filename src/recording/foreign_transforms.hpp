@@ -33,7 +33,8 @@ class ForeignTransforms {
     std::size_t pose = 0;  // its hash
   };
   struct Edge {
-    std::string parent;
+    const Edge* parent = nullptr;  // none: a root so far
+    bool is_parent = false;        // or was
     bool is_static = true;
     std::deque<Seen> seen{};          // by stamp
     std::optional<Time> forgotten{};  // the newest stamp that there was no room for
@@ -42,10 +43,11 @@ class ForeignTransforms {
   [[nodiscard]] bool takes(RecordedValue& value, TransformCounts& counts, const Report& report);
   [[nodiscard]] bool takes_sample(RecordedValue& value, Edge& edge, TransformCounts& counts,
                                   const Report& report);
-  [[nodiscard]] bool is_below(std::string frame, const std::string& top) const;
+  /// @return what the parent is below; null if the edge can be below the parent
+  [[nodiscard]] static const char* why_not_below(const Edge& parent, const Edge& edge);
   void forget_some(Edge& edge) const;
 
-  std::unordered_map<std::string, Edge> edges_;  // by child
+  std::unordered_map<std::string, Edge> edges_;  // by child; also of roots
 };
 
 }  // namespace tfdude::recording

@@ -101,7 +101,7 @@ TEST_CASE("ros import: the work for a message grows with its size, not with the 
   for (int i = 0; i < 40'000; ++i) message.push_back(edge("world", "f" + std::to_string(i), 1));
   const auto start = std::chrono::steady_clock::now();
   const auto changes = rig.take(message);
-  CHECK(std::chrono::steady_clock::now() - start < seconds(1));
+  CHECK(std::chrono::steady_clock::now() - start < seconds(3));
   REQUIRE(changes.batches.size() == 1);
   CHECK(changes.batches[0].edges.size() == message.size());
 }

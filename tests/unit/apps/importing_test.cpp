@@ -3,6 +3,7 @@
 #include "tfdude/importing.hpp"
 
 #include <array>
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -161,6 +162,28 @@ TEST_CASE("importing: sources of samples do not change") {
   CHECK(robot.claimed().value_or(0) == Approx(0.5).epsilon(1e-3));
   REQUIRE(import_frames(*robot.client, "arm", frames));
   CHECK(robot.claimed().value_or(0) == Approx(0.2));
+}
+
+TEST_CASE("importing: the structure of a deep tree is checked in linear time") {
+  Robot robot(10);
+  std::vector<FrameSpec> chain;
+  for (int i = 0; i < 8000; ++i) {
+    chain.push_back({"n" + std::to_string(i), i == 0 ? "w" : "n" + std::to_string(i - 1), {}});
+  }
+  chain.front().parent = "n7999";
+  const auto start = std::chrono::steady_clock::now();
+  const auto done = import_frames(*robot.client, "arm", chain);
+  REQUIRE_FALSE(done);
+  CHECK(done.error().code == Errc::kCycle);
+  CHECK_THAT(done.error().message,
+             ContainsSubstring("frame 'n0': its new parent 'n7999' lies below it"));
+  // Two frames that change places are none.
+  REQUIRE(robot.client->add("z", "a", known_to(0.1)));
+  REQUIRE(
+      import_frames(*robot.client, "arm", {{"a", "z", known_to(0.2)}, {"z", "w", known_to(0.2)}}));
+  chain.front().parent = "w";
+  CHECK(import_frames(*robot.client, "arm", chain).error().code == Errc::kTooMuch);
+  CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(2));
 }
 
 TEST_CASE("importing: no frame is moved below itself on the way") {

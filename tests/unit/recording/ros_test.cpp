@@ -11,6 +11,8 @@
 #include "tfdude/tf2.hpp"
 
 #include "base/cdr.hpp"
+#include "recording/edge_table.hpp"
+#include "recording/foreign_transforms.hpp"
 #include "recording/mcap_writer.hpp"
 #include "support/catch.hpp"
 
@@ -277,6 +279,27 @@ TEST_CASE("recording of ROS: a static transform ends the samples of its frame") 
   recording->seek(time_of(12'500'000'000));
   CHECK(recording->lookup("odom", "base")->pose.translation().x() == 5);
   CHECK(x_at(*recording, 10.5) == 5);
+}
+
+TEST_CASE("recording of ROS: a frame with others below it is not moved below too many") {
+  EdgeTable table;
+  ForeignTransforms transforms;
+  TransformCounts counts;
+  const auto takes = [&](const std::string& parent, const std::string& child) {
+    std::vector<RecordedValue> values(1);
+    values[0].edge = table.add(child, parent);
+    transforms.take(values, counts, [](const std::string&) {});
+    return values.size() == 1;
+  };
+  REQUIRE(takes("a", "b"));
+  for (int i = 0; i < 20'000; ++i) {
+    REQUIRE(takes("f" + std::to_string(i), "f" + std::to_string(i + 1)));
+  }
+  CHECK(takes("f20000", "leaf"));
+  CHECK(takes("f9999", "a"));
+  CHECK_FALSE(takes("f10000", "a"));
+  CHECK_FALSE(takes("b", "a"));
+  CHECK(counts.cycles == 2);
 }
 
 TEST_CASE("recording of ROS: names that look alike and cycles are counted by kind") {
