@@ -16,7 +16,6 @@ using nlohmann::json;
 
 // A client that has so much to take yet gets no picture.
 constexpr std::size_t kFoxgloveBehind = std::size_t{1} << 20U;  // [B]
-constexpr std::size_t kMostSubscriptions = 1000;
 // Ellipsoids are as large as transforms and change less: every so many pictures.
 constexpr int kSceneEvery = 6;
 
@@ -77,7 +76,10 @@ class FoxgloveTalk final : public Talk {
   void add(std::uint32_t id, std::uint32_t channel) {
     const bool exists = channel < kFirstPair ? channel >= kTransforms : pairs_.count(channel) > 0;
     if (!exists) return warn("there is no channel " + std::to_string(channel));
-    if (subscriptions_.size() >= kMostSubscriptions) return warn("too many subscriptions");
+    // A copy of all that it is told for each would cost much, and clients take one for all.
+    if (wanted(channel)) {
+      return warn("channel " + std::to_string(channel) + " has a subscription already");
+    }
     if (!subscriptions_.emplace(id, channel).second) {
       return warn("subscription " + std::to_string(id) + " exists");
     }

@@ -165,20 +165,23 @@ class Foxglove(rig.RigTest):
                 viewer = Viewer(socket)
                 await viewer.subscribe(1, "uncertainty")
                 await viewer.next(1)
-                await viewer.send(op="unsubscribe", subscriptionIds=[1])
-                await viewer.send(op="unsubscribe", subscriptionIds=[1])
+                await viewer.subscribe(3, "uncertainty")
                 await viewer.until(lambda: viewer.warnings)
+                await viewer.send(op="unsubscribe", subscriptionIds=[1])
+                await viewer.send(op="unsubscribe", subscriptionIds=[1])
+                await viewer.until(lambda: len(viewer.warnings) == 2)
                 viewer.data.clear()
                 await viewer.send(op="subscribe", subscriptions=[{"id": 2, "channelId": 999}])
                 await viewer.send(op="getParameters", parameterNames=[])
                 await viewer.send(op="subscribeConnectionGraph")
                 await socket.send(struct.pack("<BI", 1, 5) + b"data")
-                await viewer.until(lambda: len(viewer.warnings) == 5)
+                await viewer.until(lambda: len(viewer.warnings) == 6)
                 await asyncio.sleep(0.5)
                 return viewer
         viewer = self.run_async(talk())
         self.assertEqual(viewer.data, [])
-        self.assertIn("999", viewer.warnings[1])
+        self.assertIn("has a subscription already", viewer.warnings[0])
+        self.assertIn("999", viewer.warnings[2])
 
     def test_a_client_that_lies_about_lengths_is_closed_and_others_are_not(self):
         async def talk():
