@@ -7,6 +7,9 @@
 namespace tfdude {
 namespace {
 
+// Those of files are not larger.
+constexpr std::uint64_t kMaxDescription = std::uint64_t{64} << 20U;
+
 // FNV-1a with 64 bits.
 std::uint64_t hash_of(const std::string& text) {
   std::uint64_t hash = 0xcbf29ce484222325U;
@@ -39,16 +42,26 @@ Result<DescriptionPart> Descriptions::ask(const std::string& partition, std::uin
 Result<std::string> Descriptions::of(const std::string& partition, const Deadline& deadline) {
   std::string text;
   std::uint64_t hash = 0;
+  std::uint64_t size = 0;
   while (true) {
     auto part = ask(partition, text.size(), deadline);
     if (!part) return tl::unexpected(std::move(part.error()));
     if (part->size == 0) return std::string();
-    if (!text.empty() && part->hash != hash) {
+    if (part->size > kMaxDescription) {
+      return fail(Errc::kTooMuch, "partition " + quote(partition) + " has a description of " +
+                                      std::to_string(part->size) + " bytes");
+    }
+    if (!text.empty() && (part->hash != hash || part->size != size)) {
       // The text was replaced meanwhile.
+      if (deadline.over()) {
+        return fail(Errc::kTimeout, "the description of partition " + quote(partition) +
+                                        " is replaced again and again");
+      }
       text.clear();
       continue;
     }
     hash = part->hash;
+    size = part->size;
     text += part->text;
     if (text.size() == part->size && hash_of(text) == hash) return text;
     if (part->text.empty() || text.size() >= part->size) {

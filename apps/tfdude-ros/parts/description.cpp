@@ -37,7 +37,7 @@ void DescriptionIn::take(const std::string& text) {
     return;
   }
   node_.reset();
-  text_.clear();
+  const std::string former = std::exchange(text_, {});
   leave_root_to_tf(*frames);
   NodeOptions options = options_;
   options.description = text;
@@ -45,6 +45,8 @@ void DescriptionIn::take(const std::string& text) {
   if (!node) {
     spdlog::error("partition {}: {}", quote(settings_.partition), node.error().message);
     if (frames_in_ != nullptr) frames_in_->give_up({});
+    // A robot that cannot be served does not take the place of one that can.
+    if (!former.empty()) take(former);
     return;
   }
   node_.emplace(*std::move(node));

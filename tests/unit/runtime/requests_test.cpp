@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "partition/routing.hpp"
+#include "runtime/descriptions.hpp"
 #include "support/catch.hpp"
 #include "support/forest_support.hpp"
 #include "support/joint_frames.hpp"
@@ -254,6 +255,30 @@ TEST_CASE("requests: a list of an owner is returned and so is its error") {
   CHECK(all->front().id == "hand");
   CHECK(outcome(rig.requests.ask_all<HistoryInfo>("leg", HistoryRequest{true}, rig.deadline())) ==
         "unknown_partition");
+}
+
+TEST_CASE("requests: no more of a description is asked for than it may have") {
+  LoopbackNetwork network;
+  std::uint64_t size = (std::uint64_t{64} << 20U) + 1;
+  std::uint64_t grows = 0;
+  ScriptedOwner arm(network, "arm", kArm,
+                    [&](Transport& transport, const PeerId& from, const Request& request) {
+                      if (!std::holds_alternative<DescriptionRequest>(request.body)) return false;
+                      const DescriptionPart part{size, 1, std::string(kMaxDescriptionPart, '<')};
+                      transport.reply(from, {request.sequence, 0, part});
+                      size += grows;
+                      return true;
+                    });
+  Rig rig(network.join());
+  Descriptions descriptions(rig.requests, "");
+  const auto of_none = descriptions.of("arm", Deadline(10s));
+  REQUIRE(outcome(of_none) == "too_much");
+  CHECK(of_none.error().message == "partition 'arm' has a description of 67108865 bytes");
+  CHECK(arm.asked() == 1);
+  // One that grows while it is read is another one, and is read from its beginning.
+  grows = 1;
+  size = 3 * kMaxDescriptionPart - 4;
+  CHECK(outcome(descriptions.of("arm", Deadline(50ms))) == "timeout");
 }
 
 }  // namespace tfdude
