@@ -21,12 +21,15 @@ USERS = ["apps", "python"]
 ABOVE_LAYERS = {"include/tfdude/tf2.hpp": "client"}
 SUFFIXES = {".hpp", ".cpp", ".h", ".cc", ".ipp"}
 DDS_FOLDER = "src/transport/fastdds/"
-# Has another participant, in a domain of ROS. It shares the differences between versions, and the reader of CDR.
+# Has another participant, in a domain of ROS. It shares the differences between versions, the checks of
+# datagrams, and the reader of CDR.
 ROS_DDS_FOLDER = "apps/tfdude-ros/fastdds/"
 DDS_FOLDERS = (DDS_FOLDER, ROS_DDS_FOLDER)
 # What a program may include of the library's private parts. Its own build compiles what it needs of them.
 SHARED = {
-    ROS_DDS_FOLDER: ("src/transport/fastdds/compat.hpp", "src/base/cdr.hpp"),
+    ROS_DDS_FOLDER: (
+        "src/transport/fastdds/compat.hpp", "src/base/cdr.hpp", "src/transport/fastdds/datagram_guard.hpp",
+        "src/transport/fastdds/farewells.hpp", "src/transport/fastdds/send_filter.hpp"),
     "apps/tfdude-ros/config/": ("src/description/file_text.hpp", "src/description/yaml_fields.hpp"),
     "apps/tfdude-ros/logic/": ("src/types/ros_rules.hpp",),
     "apps/tfdude-web/foxglove_messages.cpp": ("src/types/ros_tf.hpp",),

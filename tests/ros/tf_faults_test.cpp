@@ -8,6 +8,7 @@
 
 #include "ros_rig.hpp"
 #include "support/catch.hpp"
+#include "support/stranger.hpp"
 
 namespace tfdude {
 namespace {
@@ -44,6 +45,23 @@ std::string owner_of(Client& client, const std::string& id) {
 }
 
 }  // namespace
+
+// Without a check, the threads of the bridge loop for good.
+TEST_CASE("ros faults: huge ranges of sequence numbers do not silence the bridge") {
+  const RosRig rig;
+  auto bridge = rig.start_bridge();
+  const RosPeer peer(rig.ros_domain());
+  testing::Stranger stranger(rig.ros_domain());
+  testing::send_huge_ranges(stranger, stranger.await_participants(2));
+  RosPeer other(rig.ros_domain());
+  other.obey("advertise /tf_static tf latched");
+  other.publish("/tf_static", tf_message(at(0), {{"base", "lidar", at_x(1)}}));
+  Client client = rig.client();
+  CHECK(eventually([&] { return x_of(client, "base", "lidar") == 1; }));
+  bridge.signal(SIGTERM);
+  CHECK(bridge.wait(testing::in_time()) == 0);
+  CHECK_THAT(bridge.err(), ContainsSubstring("dropped a datagram"));
+}
 
 TEST_CASE("ros faults: a late bridge gets the static frames, and both sides may restart") {
   const RosRig rig;

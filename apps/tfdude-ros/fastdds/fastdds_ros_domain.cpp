@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "endpoints.hpp"
+#include "guarded_udp.hpp"
 #include "identity.hpp"
 #include "well_formed.hpp"
 
@@ -25,7 +26,7 @@ void set_network(Range range, edds::DomainParticipantQos& qos) {
     udp->interfaceWhiteList.emplace_back("127.0.0.1");
   }
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(std::move(udp));
+  qos.transport().user_transports.push_back(guarded(std::move(udp)));
 }
 
 tl::unexpected<Error> not_created(const std::string& what) {

@@ -31,6 +31,11 @@ class DatagramGuard {
   /// All that the participant sends passes send(). Call it before the participant is created.
   void sees_all_sent() { sees_sent_ = !secured_; }
 
+  /// Fragments are passed on as they come: a peer of another vendor may repeat only the first one
+  /// of a sample, and wait until the others are asked for. Call it before the participant is
+  /// created.
+  void passes_fragments() { passes_fragments_ = true; }
+
   struct Bytes {
     const std::uint8_t* data;
     std::size_t size;
@@ -48,7 +53,7 @@ class DatagramGuard {
     if (flaw == DatagramFlaw::kFarewell) return;
     if (flaw != DatagramFlaw::kNone) {
       if (count(flaw, now)) log(flaw, from());
-    } else if (!fragments) {
+    } else if (!fragments || passes_fragments_) {
       const Bytes only{datagram, size};
       deliver(&only, std::size_t{1});
     } else {
@@ -92,6 +97,7 @@ class DatagramGuard {
 
   const bool secured_;
   bool sees_sent_ = false;
+  bool passes_fragments_ = false;
   NumberBounds bounds_;
   Crowd crowd_;
   Departures departures_;
