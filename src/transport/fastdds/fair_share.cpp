@@ -1,6 +1,8 @@
 #include "transport/fastdds/fair_share.hpp"
 
 #include <algorithm>
+#include <cstring>
+#include <string>
 
 #include "base/log.hpp"
 
@@ -24,6 +26,16 @@ struct Load {
   bool has_message = false;  // the datagram at hand
 };
 thread_local Load load;
+
+// The address in the order of the network, and the port.
+std::string name_of(FairShare::Sender sender) {
+  const auto address = static_cast<std::uint32_t>(sender >> 32U);
+  std::array<std::uint8_t, sizeof address> bytes{};
+  std::memcpy(bytes.data(), &address, sizeof address);
+  std::string name;
+  for (const std::uint8_t byte : bytes) name += (name.empty() ? "" : ".") + std::to_string(byte);
+  return name + ':' + std::to_string(static_cast<std::uint32_t>(sender));
+}
 
 }  // namespace
 
@@ -63,11 +75,31 @@ bool FairShare::is_due(const Account& account, Clock::time_point now) {
   return account.last < kCheap && now - account.at >= kDeafFor;
 }
 
-bool FairShare::drop() {
-  const std::uint64_t before = dropped_.fetch_add(1, std::memory_order_relaxed);
-  if ((before & (before + 1)) == 0) {  // the 1st, 2nd, 4th, 8th...
-    log().warn("dropped a datagram of a sender that takes more than its share ({} so far)",
-               before + 1);
+std::uint64_t FairShare::dropped() const {
+  std::uint64_t sum = 0;
+  for (const Dropped& kind : dropped_) sum += kind.count.load(std::memory_order_relaxed);
+  return sum;
+}
+
+bool FairShare::drop(Reason reason, Sender sender, Clock::time_point now) {
+  Dropped& kind = dropped_[static_cast<std::size_t>(reason)];
+  const std::uint64_t count = kind.count.fetch_add(1, std::memory_order_relaxed) + 1;
+  if (reason == Reason::kListening) return false;
+  const Clock::rep time = now.time_since_epoch().count();
+  Clock::rep before = kind.logged.load(std::memory_order_relaxed);
+  if (before != 0 && time - before < Clock::duration(kLogEvery).count()) return false;
+  if (!kind.logged.compare_exchange_strong(before, time)) return false;
+  const std::uint64_t many = count - kind.told.exchange(count);
+  if (reason == Reason::kPaysBack) {
+    log().info(
+        "messages of {} wait, since its last ones took long (datagrams dropped until now: {}). "
+        "They are repeated; this is no error",
+        name_of(sender), many);
+  } else {
+    log().warn(
+        "senders take more than their share while others wait, now {} (datagrams dropped until "
+        "now: {})",
+        name_of(sender), many);
   }
   return false;
 }
@@ -84,7 +116,10 @@ bool FairShare::admits_idle(Sender sender, Clock::time_point now) {
 }
 
 bool FairShare::admits(Sender sender, Clock::time_point now) {
-  if (now - load.busy_since < kOverloadedAfter) return admits_idle(sender, now) || drop();
+  if (now - load.busy_since < kOverloadedAfter) {
+    return admits_idle(sender, now) || drop(Reason::kPaysBack, sender, now);
+  }
+  Reason reason = Reason::kShare;
   {
     const Lock lock(mutex_);
     const auto known = accounts_.find(sender);
@@ -95,8 +130,9 @@ bool FairShare::admits(Sender sender, Clock::time_point now) {
     const bool listens = (now - load.busy_since) % kListenEvery >= kListenEvery - kListenFor;
     const bool limited = active_ > 1 || listens;
     if (!limited || taken <= kShare / heavy * kMemorySeconds) return true;
+    if (active_ <= 1) reason = Reason::kListening;
   }
-  return drop();
+  return drop(reason, sender, now);
 }
 
 void FairShare::spent(Sender sender, Clock::duration time, Clock::time_point now) {

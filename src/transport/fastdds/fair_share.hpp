@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -73,7 +74,10 @@ class FairShare {
   /// Handling a datagram of this sender took so long.
   void spent(Sender sender, Clock::duration time, Clock::time_point now);
 
-  [[nodiscard]] std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t dropped() const;
+
+  /// What is dropped is logged so seldom.
+  static constexpr std::chrono::seconds kLogEvery{60};
 
  private:
   struct Account {
@@ -97,7 +101,20 @@ class FairShare {
   [[nodiscard]] bool admits_idle(Sender sender, Clock::time_point now);
   /// Whether another sender is active. Counts this one.
   [[nodiscard]] bool is_contended(Sender sender, Clock::time_point now) TFDUDE_REQUIRES(mutex_);
-  bool drop();
+
+  enum class Reason : std::uint8_t {
+    kPaysBack,   ///< it has had costly messages; nobody attacks
+    kListening,  ///< it is alone, and the thread listens for others: not worth a line
+    kShare,      ///< others wait, and it has had its share
+    kCount
+  };
+  struct Dropped {
+    std::atomic<std::uint64_t> count{0};
+    std::atomic<std::uint64_t> told{0};  // the count when it was logged
+    std::atomic<Clock::rep> logged{0};   // 0: never
+  };
+  /// Counts it, without the lock. @return false
+  bool drop(Reason reason, Sender sender, Clock::time_point now);
   void count(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
 
   Mutex mutex_;
@@ -109,7 +126,7 @@ class FairShare {
   Charged last_ TFDUDE_GUARDED_BY(mutex_);        // who was charged last
   Charged last_other_ TFDUDE_GUARDED_BY(mutex_);  // and who before, if it was another one
   std::atomic<Clock::rep> grace_used_until_{0};   // nobody owes more than kGrace after that
-  std::atomic<std::uint64_t> dropped_{0};
+  std::array<Dropped, static_cast<std::size_t>(Reason::kCount)> dropped_;
 };
 
 }  // namespace tfdude::fastdds

@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "support/captured_log.hpp"
 #include "support/catch.hpp"
 
 namespace tfdude::fastdds {
@@ -72,6 +73,32 @@ TEST_CASE("fair share: a lone sender may use nearly all of a thread") {
   CHECK(std::chrono::duration<double>(spent) / (thread.now - start) > 0.9);
   // In between, those are noticed whose datagrams found no room in the queue.
   CHECK(thread.shares.dropped() > 1000);
+}
+
+TEST_CASE("fair share: the log names who takes more than its share, and no lone sender") {
+  const testing::CapturedLog captured;
+  const FairShare::Sender flood = FairShare::Sender{0x0200007F} << 32U | 7411;  // 127.0.0.2
+  const auto run = [&](Thread& thread, bool beside, std::chrono::microseconds time,
+                       std::chrono::microseconds gap) {
+    for (int i = 0; i < 20'000; ++i) {
+      (void)thread.handle(flood, time, gap);
+      if (beside && i % 100 == 0) (void)thread.handle(kOther, 20us, gap);
+    }
+    REQUIRE(thread.shares.dropped() > 0);
+  };
+  Thread alone;
+  run(alone, false, 20us, 1us);
+  CHECK(captured.text().empty());
+  Thread crowded;
+  run(crowded, true, 20us, 1us);
+  CHECK(captured.count("senders take more than their share while others wait, now 127.0.0.2:7411 "
+                       "(datagrams dropped until now: 1)") == 1);
+  CHECK(captured.count("\n") == 1);
+  const std::uint64_t before = crowded.shares.dropped();
+  crowded.now += FairShare::kLogEvery;
+  run(crowded, true, 20us, 1us);
+  CHECK(captured.count("now 127.0.0.2:7411") == 2);
+  CHECK(captured.count("until now: " + std::to_string(before) + ")") == 1);
 }
 
 TEST_CASE("fair share: a thread whose processor others take is as busy as before") {
