@@ -199,9 +199,13 @@ class GatedTransport final : public SendFilter {
     if (!descriptor_.data_ports.contain(local.port)) {
       for (std::size_t i = 0; i < many; ++i) compare_endpoints(all[i], now);
       // First, so that the announcement of one that did not leave discovers it anew.
-      descriptor_.farewells->take(
-          [&](const Farewells::Datagram& farewell) { take(farewell.data(), farewell.size()); });
-      for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
+      descriptor_.farewells->take(now, [&](const Farewells::Datagram& farewell) {
+        take(farewell.data(), farewell.size());
+      });
+      for (std::size_t i = 0; i < many; ++i) {
+        if (!is_announcement(all[i].data, all[i].size)) descriptor_.farewells->busy(now);
+        take(all[i].data, all[i].size);
+      }
       return;
     }
     const FairShare::Sender sender = sender_at(remote);

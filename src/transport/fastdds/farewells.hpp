@@ -2,7 +2,9 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <set>
 
 #include "base/mutex.hpp"
@@ -15,6 +17,11 @@ namespace tfdude::fastdds {
 /// process has replaced, or that are silent (Departures, Crowd), or that Fast DDS shall discover
 /// anew (EndpointSets): a participant that is alive is discovered again, but only one of the two
 /// knows of it.
+///
+/// A moment is chosen at which nobody else is being discovered. Fast DDS 2.9 stands still for good
+/// if it removes a participant just when another thread repeats something of discovery: each waits
+/// for a lock of the other (StatefulWriter::matched_reader_remove and the thread of the flow
+/// controller; its pull request 5432, in 2.10.7 and 3.0.2).
 /// @par Thread safety  All functions are thread-safe.
 class Farewells {
  public:
@@ -22,26 +29,41 @@ class Farewells {
   /// (RTPS 2.2, sections 8.5.3.3 and 9.6.3.9). It is not protected, with keys neither.
   using Datagram = std::array<std::uint8_t, 76>;
 
+  using Clock = std::chrono::steady_clock;
+
+  /// So long after the last message about endpoints or keys, Fast DDS has sent what it answers. It
+  /// answers acknowledgements after 5 ms.
+  static constexpr std::chrono::milliseconds kQuiet{30};
+  /// Those that leave wait no longer for that.
+  static constexpr std::chrono::milliseconds kPatience{2000};
+
   [[nodiscard]] static Datagram farewell_of(const PeerId& peer);
 
-  /// Takes effect when the next message of discovery arrives. Each participant announces itself
-  /// every 300 ms.
+  /// Takes effect when a message of discovery arrives, once it was quiet. Each participant
+  /// announces itself every 300 ms.
   void say_for(const PeerId& peer);
 
-  /// Calls say(datagram) for each participant for which it was not said yet. An atomic load if
-  /// there is none.
+  /// A message of discovery has come that is no announcement of a participant.
+  void busy(Clock::time_point now) {
+    busy_at_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
+  }
+
+  /// Calls say(datagram) for each participant for which it was not said yet, if it is time. An
+  /// atomic load if there is none.
   template <class Say>
-  void take(const Say& say) {
+  void take(Clock::time_point now, const Say& say) {
     if (!any_.load(std::memory_order_relaxed)) return;
-    for (const PeerId& peer : take_all()) say(farewell_of(peer));
+    for (const PeerId& peer : take_all(now)) say(farewell_of(peer));
   }
 
  private:
-  [[nodiscard]] std::set<PeerId> take_all();
+  [[nodiscard]] std::set<PeerId> take_all(Clock::time_point now);
 
   std::atomic<bool> any_{false};
+  std::atomic<Clock::rep> busy_at_{0};
   Mutex mutex_;
   std::set<PeerId> left_ TFDUDE_GUARDED_BY(mutex_);
+  std::optional<Clock::time_point> waiting_since_ TFDUDE_GUARDED_BY(mutex_);
 };
 
 }  // namespace tfdude::fastdds

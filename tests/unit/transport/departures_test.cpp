@@ -125,4 +125,29 @@ TEST_CASE("departures: with keys, an announcement cannot make a participant be l
   CHECK(keys.admits(announcement(0x7FFFFFFFU)));
 }
 
+TEST_CASE("departures: Fast DDS hears of them when nobody is being discovered, or after a while") {
+  Farewells farewells;
+  Farewells::Clock::time_point now{1h};
+  const auto taken = [&] {
+    int all = 0;
+    farewells.take(now, [&](const Farewells::Datagram&) { ++all; });
+    return all;
+  };
+  farewells.busy(now);
+  farewells.say_for(kPeer);
+  CHECK(taken() == 0);
+  now += Farewells::kQuiet;
+  CHECK(taken() == 1);
+  CHECK(taken() == 0);
+  farewells.say_for(kPeer);
+  farewells.say_for(kOther);
+  const auto begin = now;
+  while (now < begin + Farewells::kPatience) {
+    farewells.busy(now);
+    REQUIRE(taken() == 0);
+    now += 10ms;
+  }
+  CHECK(taken() == 2);
+}
+
 }  // namespace tfdude::fastdds
