@@ -35,11 +35,21 @@ void Crowd::make_room(Clock::time_point now) {
       ++one;
       continue;
     }
-    if (!there.verified) --unverified_;
     leave_.push_back(one->first);
-    one = announced_.erase(one);
+    one = erase(one);
   }
   any_ = !leave_.empty();
+}
+
+Crowd::All::iterator Crowd::erase(All::iterator one) {
+  if (!one->second.verified) --unverified_;
+  return announced_.erase(one);
+}
+
+void Crowd::left(const PeerId& peer) {
+  const Lock lock(mutex_);
+  const auto there = announced_.find(peer);
+  if (there != announced_.end()) erase(there);
 }
 
 void Crowd::verified(const PeerId& peer) {

@@ -39,6 +39,9 @@ class Crowd {
   /// Its identity was verified.
   void verified(const PeerId& peer);
 
+  /// Fast DDS has removed it.
+  void left(const PeerId& peer);
+
   /// Calls leave(peer) for each one that has made room.
   template <class Leave>
   void take(const Leave& leave) {
@@ -62,11 +65,13 @@ class Crowd {
     return announced_.size() < kMost && (!verifies_ || unverified_ < kMostUnverified);
   }
   void make_room(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  using All = std::unordered_map<PeerId, Present, Hash>;
+  All::iterator erase(All::iterator one) TFDUDE_REQUIRES(mutex_);
 
   const bool verifies_;
   std::atomic<bool> any_{false};
   Mutex mutex_;
-  std::unordered_map<PeerId, Present, Hash> announced_ TFDUDE_GUARDED_BY(mutex_);
+  All announced_ TFDUDE_GUARDED_BY(mutex_);
   std::size_t unverified_ TFDUDE_GUARDED_BY(mutex_) = 0;
   Clock::time_point looked_ TFDUDE_GUARDED_BY(mutex_){};
   std::vector<PeerId> leave_ TFDUDE_GUARDED_BY(mutex_);

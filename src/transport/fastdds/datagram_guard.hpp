@@ -69,6 +69,8 @@ class DatagramGuard {
 
   /// Fast DDS has verified its identity.
   void verified(const PeerId& peer) { crowd_.verified(peer); }
+  /// Fast DDS has removed it. A datagram that says so does not suffice, as Fast DDS may ignore it.
+  void left(const PeerId& peer) { crowd_.left(peer); }
 
   /// Calls leave(peer) for each participant that Fast DDS shall take for gone: those that have made
   /// room for others, and those that have said, unprotected, that they leave, and are silent since.

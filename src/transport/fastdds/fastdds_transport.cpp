@@ -364,6 +364,7 @@ void FastDdsTransport::admit(const PeerId& peer, const Announcement& said) {
 // A callback may still hold the writer. The worker then waits for it, so that the worker deletes
 // it.
 void FastDdsTransport::left(const ertps::GuidPrefix_t& prefix) {
+  guard_->left(peer_of(prefix));
   if (announced_.all->left(peer_of(prefix))) return;
   admission_.left(peer_of(prefix));
   peers_.left(prefix);

@@ -56,6 +56,21 @@ TEST_CASE("crowd: a new one gets in when others have been silent") {
   CHECK(left(crowd).empty());
 }
 
+TEST_CASE("crowd: who has left makes room at once") {
+  for (const bool verifies : {false, true}) {
+    Crowd crowd(verifies);
+    const Crowd::Clock::time_point now{1h};
+    for (std::uint32_t n = 0; n < 4 * Crowd::kMost; ++n) {
+      REQUIRE(crowd.admit(peer(n), now));
+      // Most are verified before.
+      if (n % 7 != 0) crowd.verified(peer(n));
+      if (n % 9 != 0) continue;
+      for (std::uint32_t gone = n < 9 ? 0 : n - 9; gone <= n; ++gone) crowd.left(peer(gone));
+    }
+    CHECK(left(crowd).empty());
+  }
+}
+
 TEST_CASE("crowd: with keys, few are not verified at a time, and only for a while") {
   Crowd crowd(true);
   Crowd::Clock::time_point now{1h};
