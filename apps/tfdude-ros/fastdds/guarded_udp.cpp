@@ -43,7 +43,7 @@ class GuardedTransport final : public fastdds::SendFilter {
     };
     const auto deliver = [&](const DatagramGuard::Bytes* all, std::size_t many) {
       if (is_of_discovery(local)) {
-        descriptor_.farewells->take(now, [&](const auto& said) { take(said.data(), said.size()); });
+        descriptor_.farewells->take([&](const auto& said) { take(said.data(), said.size()); });
       }
       for (std::size_t i = 0; i < many; ++i) take(all[i].data, all[i].size);
     };

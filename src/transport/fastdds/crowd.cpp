@@ -12,6 +12,7 @@ std::size_t Crowd::Hash::operator()(const PeerId& peer) const {
 
 bool Crowd::admit(const PeerId& peer, Clock::time_point now) {
   const Lock lock(mutex_);
+  if (verifies_ && now - listened_ > std::chrono::seconds(1)) drop_silent(now);
   const auto same = announced_.find(peer);
   if (same != announced_.end()) {
     same->second.heard = now;
@@ -28,10 +29,21 @@ bool Crowd::admit(const PeerId& peer, Clock::time_point now) {
 
 void Crowd::make_room(Clock::time_point now) {
   looked_ = now;
-  for (auto one = announced_.begin(); one != announced_.end();) {
-    const Present& there = one->second;
+  drop([&](const Present& there) {
     const bool unproven = verifies_ && !there.verified && now - there.since > kVerifiedWithin;
-    if (!unproven && now - there.heard <= kPatience) {
+    return unproven || now - there.heard > kPatience;
+  });
+}
+
+void Crowd::drop_silent(Clock::time_point now) {
+  listened_ = now;
+  drop([&](const Present& there) { return now - there.heard > kSilence; });
+}
+
+template <class Leaves>
+void Crowd::drop(const Leaves& leaves) {
+  for (auto one = announced_.begin(); one != announced_.end();) {
+    if (!leaves(one->second)) {
       ++one;
       continue;
     }

@@ -18,7 +18,10 @@ namespace tfdude::fastdds {
 ///
 /// With keys, Fast DDS sends handshakes to each of them, again and again, and whoever is real is
 /// verified soon. So only kMostUnverified are not verified at a time, and one that was not within
-/// kVerifiedWithin makes room, even if it goes on announcing itself.
+/// kVerifiedWithin makes room, even if it goes on announcing itself. And one that is silent for
+/// kSilence leaves, whether there is room or not, before its lease ends: Fast DDS 2.9 stands still
+/// for good if its thread for timers removes one just when another thread does so, as each waits
+/// for the other (SecurityManager::remove_participant).
 /// @par Thread safety  All functions are thread-safe.
 class Crowd {
  public:
@@ -28,6 +31,8 @@ class Crowd {
   static constexpr std::chrono::seconds kPatience{10};
   static constexpr std::size_t kMostUnverified = 48;
   static constexpr std::chrono::seconds kVerifiedWithin{3};
+  /// DDS keeps a silent participant for 30 s.
+  static constexpr std::chrono::seconds kSilence{20};
 
   /// @param verifies  the participant has keys
   explicit Crowd(bool verifies = false) : verifies_(verifies) {}
@@ -65,6 +70,9 @@ class Crowd {
     return announced_.size() < kMost && (!verifies_ || unverified_ < kMostUnverified);
   }
   void make_room(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  void drop_silent(Clock::time_point now) TFDUDE_REQUIRES(mutex_);
+  template <class Leaves>
+  void drop(const Leaves& leaves) TFDUDE_REQUIRES(mutex_);
   using All = std::unordered_map<PeerId, Present, Hash>;
   All::iterator erase(All::iterator one) TFDUDE_REQUIRES(mutex_);
 
@@ -73,7 +81,8 @@ class Crowd {
   Mutex mutex_;
   All announced_ TFDUDE_GUARDED_BY(mutex_);
   std::size_t unverified_ TFDUDE_GUARDED_BY(mutex_) = 0;
-  Clock::time_point looked_ TFDUDE_GUARDED_BY(mutex_){};
+  Clock::time_point looked_ TFDUDE_GUARDED_BY(mutex_){};    // for room
+  Clock::time_point listened_ TFDUDE_GUARDED_BY(mutex_){};  // for those that are silent
   std::vector<PeerId> leave_ TFDUDE_GUARDED_BY(mutex_);
 };
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <sys/resource.h>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -199,9 +200,7 @@ class GatedTransport final : public SendFilter {
     if (!descriptor_.data_ports.contain(local.port)) {
       for (std::size_t i = 0; i < many; ++i) compare_endpoints(all[i], now);
       // First, so that the announcement of one that did not leave discovers it anew.
-      descriptor_.farewells->take(now, [&](const Farewells::Datagram& farewell) {
-        take(farewell.data(), farewell.size());
-      });
+      say_farewells(take, now);
       for (std::size_t i = 0; i < many; ++i) {
         if (!is_announcement(all[i].data, all[i].size)) descriptor_.farewells->busy(now);
         take(all[i].data, all[i].size);
@@ -215,6 +214,22 @@ class GatedTransport final : public SendFilter {
     }
     const auto end = FairShare::Clock::now();
     descriptor_.shares->spent(sender, end - now, end);
+  }
+
+  template <class Take>
+  void say_farewells(const Take& take, Farewells::Clock::time_point now) {
+    const auto when = descriptor_.farewells->when(now);
+    if (when == Farewells::When::kLater) return;
+    const auto say = [&](const Farewells::Datagram& farewell) {
+      take(farewell.data(), farewell.size());
+    };
+    // Without keys, two threads that handle messages of discovery would wait for each other.
+    if (when == Farewells::When::kNow || descriptor_.discovering == nullptr) {
+      return descriptor_.farewells->take(say);
+    }
+    const Gate::Pause pause(*descriptor_.gate);
+    std::this_thread::sleep_for(Farewells::kQuiet);
+    descriptor_.farewells->take(say);
   }
 
   void compare_endpoints(const DatagramGuard::Bytes& datagram, FairShare::Clock::time_point now) {

@@ -43,11 +43,16 @@ void Farewells::say_for(const PeerId& peer) {
   any_ = true;
 }
 
-std::set<PeerId> Farewells::take_all(Clock::time_point now) {
+Farewells::When Farewells::when_to_take(Clock::time_point now) {
   const Clock::time_point busy_at{Clock::duration(busy_at_.load(std::memory_order_relaxed))};
+  if (now - busy_at >= kQuiet) return When::kNow;
   const Lock lock(mutex_);
   if (!waiting_since_) waiting_since_ = now;
-  if (now - busy_at < kQuiet && now - *waiting_since_ < kPatience) return {};
+  return now - *waiting_since_ < kPatience ? When::kLater : When::kOnceQuiet;
+}
+
+std::set<PeerId> Farewells::take_all() {
+  const Lock lock(mutex_);
   waiting_since_.reset();
   any_ = false;
   return std::exchange(left_, {});

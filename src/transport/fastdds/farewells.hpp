@@ -34,7 +34,7 @@ class Farewells {
   /// So long after the last message about endpoints or keys, Fast DDS has sent what it answers. It
   /// answers acknowledgements after 5 ms.
   static constexpr std::chrono::milliseconds kQuiet{30};
-  /// Those that leave wait no longer for that.
+  /// Those that leave wait no longer for that: then it has to be made quiet.
   static constexpr std::chrono::milliseconds kPatience{2000};
 
   [[nodiscard]] static Datagram farewell_of(const PeerId& peer);
@@ -48,16 +48,23 @@ class Farewells {
     busy_at_.store(now.time_since_epoch().count(), std::memory_order_relaxed);
   }
 
-  /// Calls say(datagram) for each participant for which it was not said yet, if it is time. An
-  /// atomic load if there is none.
+  enum class When : std::uint8_t { kLater, kNow, kOnceQuiet };
+
+  /// Whether it is time to say it for some. If they have waited for too long, kOnceQuiet: let no
+  /// message in for kQuiet before. An atomic load if there is none.
+  [[nodiscard]] When when(Clock::time_point now) {
+    return any_.load(std::memory_order_relaxed) ? when_to_take(now) : When::kLater;
+  }
+
+  /// Calls say(datagram) for each participant for which it was not said yet.
   template <class Say>
-  void take(Clock::time_point now, const Say& say) {
-    if (!any_.load(std::memory_order_relaxed)) return;
-    for (const PeerId& peer : take_all(now)) say(farewell_of(peer));
+  void take(const Say& say) {
+    for (const PeerId& peer : take_all()) say(farewell_of(peer));
   }
 
  private:
-  [[nodiscard]] std::set<PeerId> take_all(Clock::time_point now);
+  [[nodiscard]] When when_to_take(Clock::time_point now);
+  [[nodiscard]] std::set<PeerId> take_all();
 
   std::atomic<bool> any_{false};
   std::atomic<Clock::rep> busy_at_{0};

@@ -71,6 +71,20 @@ TEST_CASE("crowd: who has left makes room at once") {
   }
 }
 
+TEST_CASE("crowd: with keys, who is silent leaves before its lease ends") {
+  for (const bool verifies : {false, true}) {
+    Crowd crowd(verifies);
+    const Crowd::Clock::time_point now{1h};
+    REQUIRE(crowd.admit(peer(1), now));
+    for (auto later = now; later <= now + 20s; later += 300ms) {
+      CHECK(left(crowd).empty());
+      REQUIRE(crowd.admit(peer(2), later));
+    }
+    REQUIRE(crowd.admit(peer(2), now + 23s));
+    CHECK(left(crowd).size() == (verifies ? 1 : 0));
+  }
+}
+
 TEST_CASE("crowd: with keys, few are not verified at a time, and only for a while") {
   Crowd crowd(true);
   Crowd::Clock::time_point now{1h};

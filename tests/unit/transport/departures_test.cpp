@@ -128,26 +128,32 @@ TEST_CASE("departures: with keys, an announcement cannot make a participant be l
 TEST_CASE("departures: Fast DDS hears of them when nobody is being discovered, or after a while") {
   Farewells farewells;
   Farewells::Clock::time_point now{1h};
+  using When = Farewells::When;
   const auto taken = [&] {
     int all = 0;
-    farewells.take(now, [&](const Farewells::Datagram&) { ++all; });
+    farewells.take([&](const Farewells::Datagram&) { ++all; });
     return all;
   };
   farewells.busy(now);
   farewells.say_for(kPeer);
-  CHECK(taken() == 0);
+  CHECK(farewells.when(now) == When::kLater);
   now += Farewells::kQuiet;
+  CHECK(farewells.when(now) == When::kNow);
   CHECK(taken() == 1);
+  CHECK(farewells.when(now) == When::kLater);
   CHECK(taken() == 0);
-  farewells.say_for(kPeer);
-  farewells.say_for(kOther);
-  const auto begin = now;
-  while (now < begin + Farewells::kPatience) {
-    farewells.busy(now);
-    REQUIRE(taken() == 0);
-    now += 10ms;
+  for (int i = 0; i < 2; ++i) {
+    farewells.say_for(kPeer);
+    farewells.say_for(kOther);
+    const auto begin = now;
+    while (now < begin + Farewells::kPatience) {
+      farewells.busy(now);
+      REQUIRE(farewells.when(now) == When::kLater);
+      now += 10ms;
+    }
+    CHECK(farewells.when(now) == When::kOnceQuiet);
+    CHECK(taken() == 2);
   }
-  CHECK(taken() == 2);
 }
 
 }  // namespace tfdude::fastdds
