@@ -84,14 +84,13 @@ bool Call::awaits_arrival(const Directory& directory, Clock::time_point now) {
 void Call::note_processes(const Directory& directory) {
   if (!task_.changes() || !asked_.empty()) return;
   for (const Part& part : task_.parts()) {
-    if (part.owner == kHeldHere) continue;
-    asked_.push_back({part.owner, part.partition, directory.process(part.owner)});
+    if (part.owner != kHeldHere) asked_.emplace_back(part.owner, directory.process(part.owner));
   }
 }
 
 void Call::find_restarted(const Directory& directory) {
-  for (const Asked& one : asked_) {
-    if (directory.process(one.owner) != one.process) restarted_ = one.partition;
+  for (const auto& [owner, process] : asked_) {
+    if (directory.process(owner) != process) restarted_ = directory.name(owner);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calls/pending_requests.hpp"
@@ -176,13 +177,8 @@ class Call {
   std::vector<std::string> late_;
   bool outdates_ = false;
   std::optional<Clock::time_point> arrives_by_;
-  struct Asked {
-    Owner owner;
-    std::string partition;
-    std::uint64_t process;
-  };
-  std::vector<Asked> asked_;  // for a change, at first
-  std::string restarted_;     // one of them that has another process now; empty: none
+  std::vector<std::pair<Owner, std::uint64_t>> asked_;  // for a change, at first: the processes
+  std::string restarted_;  // one of them that has another process now; empty: none
   int attempts_ = 0;
   bool changed_ = false;  // the structure, since the first of them
   Milliseconds pause_;
